@@ -1,0 +1,246 @@
+"""What goes out: levels of detail, each a mesh or a cloud of billboards, and the chain of them.
+
+Field terms: a *billboard* is one textured rectangle fixed in the plant's space; a *cluster* is the
+set of faces that it shows; a *shape* is how many billboards show one cluster (1, 2 or 3 crossed).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import radians, tan
+from typing import Any, Literal
+
+import numpy as np
+
+from vegtool.arrays import ByteArray, FloatArray, IntArray, checked
+from vegtool.plant import Plant
+
+Kind = Literal["mesh", "billboards"]
+
+
+@dataclass(frozen=True)
+class Display:
+    """For whom distances are stated: vertical field of view (degrees) and image height (pixels)."""
+
+    fov_y_deg: float = 60.0
+    image_height_px: int = 1080
+
+    def pixels_per_metre(self, distance_m: float) -> float:
+        """Pixels that one metre covers at the centre of the image, that far from the viewer."""
+        return self.image_height_px / (2 * tan(radians(self.fov_y_deg) / 2) * distance_m)
+
+    def distance_m(self, pixels_per_metre: float) -> float:
+        """The distance at which one metre covers that many pixels."""
+        return self.image_height_px / (2 * tan(radians(self.fov_y_deg) / 2) * pixels_per_metre)
+
+
+@dataclass(frozen=True, eq=False)
+class Billboards:
+    """The planes of a level, p of them.
+
+    center: (p, 3) metres, centre of the rectangle. u, v: (p, 3) unit vectors in the plane, right
+    and up as seen from the front; the front's normal is u x v. half_size: (p, 2) metres along u, v.
+    half_depth: (p,) metres, half extent of the cluster across the plane; may be 0.
+    cluster: (p,) int32, the cluster that the plane shows; crossed planes share theirs.
+    """
+
+    center: FloatArray
+    u: FloatArray
+    v: FloatArray
+    half_size: FloatArray
+    half_depth: FloatArray
+    cluster: IntArray
+
+    def __post_init__(self) -> None:
+        center = checked("Billboards.center", self.center, (None, 3), np.float64)
+        n = len(center)
+        values = {
+            "center": center,
+            "u": checked("Billboards.u", self.u, (n, 3), np.float64),
+            "v": checked("Billboards.v", self.v, (n, 3), np.float64),
+            "half_size": checked("Billboards.half_size", self.half_size, (n, 2), np.float64),
+            "half_depth": checked("Billboards.half_depth", self.half_depth, (n,), np.float64),
+            "cluster": checked("Billboards.cluster", self.cluster, (n,), np.int32),
+        }
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    def __len__(self) -> int:
+        return len(self.center)
+
+    @cached_property
+    def normal(self) -> FloatArray:
+        """(p, 3) unit vectors: the side from which the front texture is seen."""
+        return np.asarray(np.cross(self.u, self.v))
+
+
+@dataclass(frozen=True, eq=False)
+class Atlas:
+    """The textures of a level, and where in them each billboard's picture lies.
+
+    color: (h, w, 4) uint8, sRGB, straight alpha; alpha is coverage; colour dilated under alpha 0.
+    normal: (h, w, 3) uint8, tangent space of the billboard (x along u, y along v, blue > 0.5).
+    depth: (h, w) uint16, signed depth along the front normal over the billboard's half_depth:
+    32768 is the plane, 65535 half_depth towards the viewer, 1 half_depth behind; 0 where alpha is 0.
+    front, back: (p, 4) int32 texels x0, y0, width, height (y down from the top row), gutter not
+    included. Both pictures have their left edge at -u and their top edge at +v, so the back's is
+    the mirror image of what one sees from behind; a back normal's z points along -(u x v).
+    back equals front where one picture serves both sides.
+    """
+
+    color: ByteArray
+    normal: ByteArray
+    depth: np.ndarray
+    front: IntArray
+    back: IntArray
+
+    def __post_init__(self) -> None:
+        color = checked("Atlas.color", self.color, (None, None, 4), np.uint8)
+        height, width = color.shape[:2]
+        front = checked("Atlas.front", self.front, (None, 4), np.int32)
+        values = {
+            "color": color,
+            "normal": checked("Atlas.normal", self.normal, (height, width, 3), np.uint8),
+            "depth": checked("Atlas.depth", self.depth, (height, width), np.uint16),
+            "front": front,
+            "back": checked("Atlas.back", self.back, (len(front), 4), np.int32),
+        }
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    @property
+    def texels(self) -> int:
+        """Texels of one channel set: width times height."""
+        return int(self.color.shape[0] * self.color.shape[1])
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """One level of detail: a mesh (a Plant), or billboards with their atlas.
+
+    double_sided: one quad per billboard, drawn from both sides with one picture (the client flips
+    the normal on the back). Else two opposite single-sided quads, each with its own picture.
+    texels_per_metre: density of the atlas. near_distance_m: from here on the level may be used.
+    geometric_error_m: (maximum, 95th percentile) of DESIGN section 7, or None if not computed.
+    seconds: how long each stage of making it took.
+    """
+
+    kind: Kind
+    mesh: Plant | None = None
+    billboards: Billboards | None = None
+    atlas: Atlas | None = None
+    double_sided: bool = True
+    texels_per_metre: float = 0.0
+    near_distance_m: float = 0.0
+    geometric_error_m: tuple[float, float] | None = None
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.kind == "mesh" and self.mesh is None:
+            raise ValueError("Level: a mesh level needs its mesh")
+        if self.kind == "billboards" and (self.billboards is None or self.atlas is None):
+            raise ValueError("Level: a billboard level needs billboards and an atlas")
+        if self.billboards is not None and self.atlas is not None:
+            if len(self.atlas.front) != len(self.billboards):
+                raise ValueError("Level: the atlas needs one rectangle per billboard")
+
+    @property
+    def triangles(self) -> int:
+        """Triangles as they stand in the file."""
+        if self.billboards is not None:
+            return len(self.billboards) * (2 if self.double_sided else 4)
+        assert self.mesh is not None
+        return len(self.mesh.faces)
+
+    @property
+    def texels(self) -> int:
+        """Texels of all the level's textures (colour and normal counted each)."""
+        if self.atlas is not None:
+            return 2 * self.atlas.texels
+        assert self.mesh is not None
+        images = [t for m in self.mesh.materials for t in (m.color_texture, m.normal_texture) if t]
+        unique = {id(t): t.pixels.shape[0] * t.pixels.shape[1] for t in images}
+        return int(sum(unique.values()))
+
+
+@dataclass(frozen=True, eq=False)
+class LodChain:
+    """All levels of a plant: levels[0] is the original, then coarser and coarser.
+
+    options: everything that shaped the result, as plain values, for the manifest.
+    """
+
+    name: str
+    levels: tuple[Level, ...]
+    display: Display
+    seed: int
+    options: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Quads:
+    """A billboard level as the triangles that a client draws: q quads, 4 vertices each.
+
+    positions (4q, 3), normals (4q, 3), tangents (4q, 4; w is the bitangent's sign) and uvs (4q, 2)
+    float64; indices (6q,) int32. Corner order: lower left, lower right, upper right, upper left as
+    seen from the front.
+    """
+
+    positions: FloatArray
+    normals: FloatArray
+    tangents: FloatArray
+    uvs: FloatArray
+    indices: IntArray
+
+
+def billboard_quads(level: Level) -> Quads:
+    """The quads of a billboard level: one per billboard if double-sided, else front and back.
+
+    Both quads of a pair keep the corner positions' texture coordinates (Atlas.back is stored
+    mirrored), so the back's tangent runs along u like the front's: its normal turns, its tangent
+    frame is mirrored, hence w = -1.
+    """
+    b, atlas = level.billboards, level.atlas
+    if b is None or atlas is None:
+        raise ValueError("billboard_quads: needs a level of kind billboards")
+    signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=np.float64)
+    steps = signs[None] * b.half_size[:, None]  # (p, 4, 2)
+    corners = b.center[:, None] + steps[..., :1] * b.u[:, None] + steps[..., 1:] * b.v[:, None]
+    height, width = atlas.color.shape[:2]
+
+    def uvs(rect: IntArray) -> FloatArray:
+        x0, y0, w, h = rect.astype(np.float64).T
+        left, right, top, bottom = x0 / width, (x0 + w) / width, y0 / height, (y0 + h) / height
+        return np.stack(
+            [
+                np.stack([left, bottom], 1),
+                np.stack([right, bottom], 1),
+                np.stack([right, top], 1),
+                np.stack([left, top], 1),
+            ],
+            axis=1,
+        )
+
+    def tangents(w: float) -> FloatArray:
+        rows = np.concatenate([b.u, np.full((len(b), 1), w)], axis=1)
+        return np.repeat(rows, 4, axis=0)
+
+    triangle = np.array([0, 1, 2, 0, 2, 3], dtype=np.int32)
+    base = 4 * np.arange(len(b), dtype=np.int32)[:, None]
+    front = Quads(
+        corners.reshape(-1, 3),
+        np.repeat(b.normal, 4, axis=0),
+        tangents(1.0),
+        uvs(atlas.front).reshape(-1, 2),
+        (base + triangle).ravel(),
+    )
+    if level.double_sided:
+        return front
+    return Quads(
+        np.concatenate([front.positions, front.positions]),
+        np.concatenate([front.normals, -front.normals]),
+        np.concatenate([front.tangents, tangents(-1.0)]),
+        np.concatenate([front.uvs, uvs(atlas.back).reshape(-1, 2)]),
+        np.concatenate([front.indices, (4 * len(b) + base + triangle[::-1]).ravel()]),
+    )
