@@ -1,0 +1,79 @@
+"""One OpenGL context for everything that is drawn without a window.
+
+OpenGL 3.3 core, so that the same shaders run on Mesa's software rasteriser, on any GPU, and on
+macOS (4.1). On Linux the context comes from EGL and needs neither a display nor a GPU.
+"""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import dataclass
+from functools import cache
+from platform import system
+from typing import Any
+
+import moderngl
+
+from vegtool.errors import CapabilityError
+
+REQUIRED_VERSION = 330
+LINUX_PACKAGES = (
+    ("apt-get", "sudo apt-get install libegl1 libgl1-mesa-dri"),
+    ("dnf", "sudo dnf install mesa-libEGL mesa-dri-drivers"),
+    ("pacman", "sudo pacman -S mesa"),
+    ("zypper", "sudo zypper install Mesa-libEGL1 Mesa-dri"),
+    ("apk", "sudo apk add mesa-egl mesa-dri-gallium"),
+)
+
+
+@dataclass(frozen=True)
+class ContextInfo:
+    """What draws here. version: as the driver words it; max_texture: texels along one side."""
+
+    vendor: str
+    renderer: str
+    version: str
+    max_texture: int
+    software: bool
+
+
+@cache
+def context() -> moderngl.Context:
+    """The process's context without a window, made on the first call.
+
+    Raises CapabilityError, naming the one command that helps, where there is no OpenGL 3.3.
+    """
+    settings: dict[str, Any] = {"require": REQUIRED_VERSION, "standalone": True}
+    if system() == "Linux":
+        settings["backend"] = "egl"
+    try:
+        made = moderngl.create_context(**settings)
+    except Exception as error:  # glcontext raises bare Exception for all it cannot do
+        raise CapabilityError(
+            f"OpenGL 3.3 without a window is needed and was not found ({error}). {remedy()}"
+        ) from error
+    made.gc_mode = "auto"
+    return made
+
+
+def remedy() -> str:
+    """The sentence that says what to install on this machine."""
+    if system() == "Linux":
+        for manager, command in LINUX_PACKAGES:
+            if shutil.which(manager):
+                return f"Install it with: {command}"
+        return "Install Mesa's EGL library and its drivers with your package manager."
+    return "Update the graphics driver."
+
+
+def describe(ctx: moderngl.Context | None = None) -> ContextInfo:
+    """Vendor, renderer, version and limits of `ctx`, by default of the shared context."""
+    info = (ctx or context()).info
+    renderer = str(info["GL_RENDERER"])
+    return ContextInfo(
+        vendor=str(info["GL_VENDOR"]),
+        renderer=renderer,
+        version=str(info["GL_VERSION"]),
+        max_texture=int(info["GL_MAX_TEXTURE_SIZE"]),
+        software=any(name in renderer.lower() for name in ("llvmpipe", "softpipe", "swiftshader")),
+    )

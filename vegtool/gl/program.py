@@ -1,0 +1,43 @@
+"""Shader programs, made once per context from the files in `shaders/`.
+
+A line `#include "name.glsl"` is replaced by that file. Names given as `defines` follow `#version`.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.resources import files
+from weakref import WeakKeyDictionary
+
+import moderngl
+
+HEADER = "#version 330 core\n"
+_programs: WeakKeyDictionary[moderngl.Context, dict[tuple[str, ...], moderngl.Program]] = (
+    WeakKeyDictionary()
+)
+
+
+def program(ctx: moderngl.Context, vertex: str, fragment: str, *defines: str) -> moderngl.Program:
+    """The program of two shader files, compiled for `ctx` on the first call.
+
+    vertex, fragment: file names in `vegtool/gl/shaders`. defines: names, or "NAME value".
+    """
+    made = _programs.setdefault(ctx, {})
+    key = (vertex, fragment, *defines)
+    if key not in made:
+        head = HEADER + "".join(f"#define {name}\n" for name in defines)
+        made[key] = ctx.program(
+            vertex_shader=head + source(vertex), fragment_shader=head + source(fragment)
+        )
+    return made[key]
+
+
+@cache
+def source(name: str) -> str:
+    """The text of a shader file, its includes put in."""
+    text = (files("vegtool.gl") / "shaders" / name).read_text(encoding="utf-8")
+    lines = []
+    for line in text.splitlines():
+        included = line.partition('#include "')[2]
+        lines.append(source(included.rstrip('"')) if included else line)
+    return "\n".join(lines) + "\n"

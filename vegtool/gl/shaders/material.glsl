@@ -1,0 +1,32 @@
+// A surface in glTF's terms; set by PlantBuffers.use. Colours are linear: the texture is sRGB8.
+uniform sampler2D color_map;
+uniform vec4 base_color;
+uniform float alpha_cutoff;  // 0 for opaque materials: nothing is below it
+
+vec3 surface_color(vec2 uv, vec4 vertex_color) {
+    vec4 color = texture(color_map, uv) * base_color * vertex_color;
+    if (color.a < alpha_cutoff) discard;
+    return color.rgb;
+}
+
+#ifdef NORMAL_MAP
+uniform sampler2D normal_map;
+uniform float normal_scale;
+
+// The frame comes from screen derivatives (dP/du and -dP/dv, solved, so that it holds whatever way
+// up the picture lies): the reader drops tangents, and models of plants rarely carry them.
+vec3 mapped_normal(vec3 normal, vec3 position, vec2 uv) {
+    vec3 dp1 = dFdx(position), dp2 = dFdy(position);
+    vec2 duv1 = dFdx(uv), duv2 = dFdy(uv);
+    float det = duv1.x * duv2.y - duv2.x * duv1.y;
+    if (abs(det) < 1e-20) return normal;
+    vec3 along_u = (dp1 * duv2.y - dp2 * duv1.y) * sign(det);
+    vec3 along_v = (dp1 * duv2.x - dp2 * duv1.x) * sign(det);  // towards smaller v: glTF's +Y
+    vec3 tangent = along_u - normal * dot(normal, along_u);
+    vec3 bitangent = along_v - normal * dot(normal, along_v);
+    vec3 texel = texture(normal_map, uv).xyz * 2.0 - 1.0;
+    texel.xy *= normal_scale;
+    return normalize(normalize(tangent) * texel.x + normalize(bitangent) * texel.y
+                     + normal * texel.z);
+}
+#endif

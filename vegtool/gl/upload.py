@@ -1,0 +1,218 @@
+"""A plant on the GPU: uploaded once, drawn any number of times.
+
+Colour textures are sRGB8_ALPHA8, so that filtering happens in linear light. They have no mips
+unless asked for: mips lose the coverage of alpha-tested leaves (DESIGN section 4), so bakes and
+truths supersample instead, and only a picture of "what a client shows" wants them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from types import TracebackType
+from typing import TypeVar
+
+import moderngl
+import numpy as np
+import numpy.typing as npt
+
+from vegtool.arrays import ByteArray, FloatArray
+from vegtool.gl.context import context
+from vegtool.plant import Material, Plant, Texture
+
+Owned = TypeVar("Owned", moderngl.Buffer, moderngl.Texture, moderngl.VertexArray)
+
+SRGB8_ALPHA8 = 0x8C43
+VERTEX_FLOATS = 12
+"""Per vertex: position, u, normal, v, colour (4); three vec4, as attributes or as texels."""
+DATA_TEXTURE_WIDTH = 3 * 1024
+"""Texels in a row of the vertex data texture: 1,024 vertices; below every GL 3.3 limit."""
+
+
+@dataclass(frozen=True)
+class MaterialGroup:
+    """The faces of one material: `count` faces from `first` on, in the order of `face_order`."""
+
+    material: Material
+    first: int
+    count: int
+    color_map: moderngl.Texture
+    normal_map: moderngl.Texture | None
+
+
+class PlantBuffers:
+    """A plant's vertices, indices and textures on the GPU. A context manager: leaving releases.
+
+    origin: (3,) metres; what is uploaded is relative to it (float32), so a view or billboard
+    matrix has to be as well.
+    face_order: (f,) the plant's faces in the order of the index buffer, material by material.
+    groups: one per material that has faces.
+    mipmaps: give textures mips, as a client does, and leave the colour under alpha 0 as it is.
+    """
+
+    def __init__(
+        self, plant: Plant, *, mipmaps: bool = False, ctx: moderngl.Context | None = None
+    ) -> None:
+        self.plant = plant
+        self.ctx = ctx or context()
+        self.origin: FloatArray = plant.center
+        self.face_order = np.argsort(plant.face_material, kind="stable").astype(np.int32)
+        self._mipmaps = mipmaps
+        self._textures: dict[tuple[int, bool], moderngl.Texture] = {}
+        self._owned: list[moderngl.Buffer | moderngl.Texture | moderngl.VertexArray] = []
+        self._arrays: dict[moderngl.Program, moderngl.VertexArray] = {}
+        self.groups = self._material_groups()
+
+    def __enter__(self) -> PlantBuffers:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.release()
+
+    def release(self) -> None:
+        """Free everything on the GPU."""
+        for owned in reversed(self._owned):
+            owned.release()
+        self._owned.clear()
+        self._arrays.clear()
+        self._textures.clear()
+
+    @cached_property
+    def indices(self) -> moderngl.Buffer:
+        """Three uint32 per face, material by material."""
+        ordered = self.plant.faces[self.face_order].astype(np.uint32)
+        return self._own(self.ctx.buffer(ordered.tobytes()))
+
+    @cached_property
+    def vertices(self) -> moderngl.Buffer:
+        """Three vec4 per vertex: `in_position_u`, `in_normal_v`, `in_color`."""
+        return self._own(self.ctx.buffer(vertex_data(self.plant, self.origin).tobytes()))
+
+    @cached_property
+    def vertex_texture(self) -> moderngl.Texture:
+        """The same three vec4 per vertex as RGBA32F texels, 1,024 vertices to a row."""
+        data = vertex_data(self.plant, self.origin)
+        rows = max(1, -(-data.size // (4 * DATA_TEXTURE_WIDTH)))
+        texels = np.zeros((rows, DATA_TEXTURE_WIDTH, 4), dtype=np.float32)
+        texels.reshape(-1)[: data.size] = data.reshape(-1)
+        texture = self.ctx.texture((DATA_TEXTURE_WIDTH, rows), 4, texels.tobytes(), dtype="f4")
+        texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        return self._own(texture)
+
+    def vertex_array(self, program: moderngl.Program) -> moderngl.VertexArray:
+        """The plant as input of `program`, which declares in_position_u, in_normal_v, in_color."""
+        if program not in self._arrays:
+            names = [n for n in ("in_position_u", "in_normal_v", "in_color") if n in program]
+            layout = " ".join(
+                "4f" if n in names else "16x" for n in ("in_position_u", "in_normal_v", "in_color")
+            )
+            self._arrays[program] = self._own(
+                self.ctx.vertex_array(program, [(self.vertices, layout, *names)], self.indices)
+            )
+        return self._arrays[program]
+
+    def use(self, group: MaterialGroup, program: moderngl.Program) -> None:
+        """Bind a material's textures (units 0 and 1) and set the uniforms of `material.glsl`."""
+        material = group.material
+        group.color_map.use(0)
+        if group.normal_map is not None:
+            group.normal_map.use(1)
+        cutoff = material.alpha_cutoff if material.alpha_mode == "mask" else 0.0
+        values = {
+            "color_map": 0,
+            "normal_map": 1,
+            "base_color": tuple(material.base_color),
+            "alpha_cutoff": cutoff,
+            "normal_scale": material.normal_scale,
+        }
+        for name, value in values.items():
+            if name in program:  # the compiler drops what a variant does not read
+                program[name] = value
+
+    def _material_groups(self) -> tuple[MaterialGroup, ...]:
+        counts = np.bincount(self.plant.face_material, minlength=len(self.plant.materials))
+        firsts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+        return tuple(
+            MaterialGroup(
+                material,
+                int(first),
+                int(count),
+                self._texture(material.color_texture, True, material.alpha_mode == "mask"),
+                None
+                if material.normal_texture is None
+                else self._texture(material.normal_texture, False, False),
+            )
+            for material, first, count in zip(self.plant.materials, firsts, counts, strict=True)
+            if count
+        )
+
+    def _texture(self, image: Texture | None, srgb: bool, cut_out: bool) -> moderngl.Texture:
+        key = (id(image), srgb)
+        if key not in self._textures:
+            pixels = np.full((1, 1, 4), 255, np.uint8) if image is None else image.pixels
+            if cut_out and not self._mipmaps:
+                pixels = bled_under_alpha(pixels)
+            height, width = pixels.shape[:2]
+            limit = int(self.ctx.info["GL_MAX_TEXTURE_SIZE"])
+            while max(height, width) > limit:  # keep every second texel: rare, and never an error
+                pixels = np.ascontiguousarray(pixels[::2, ::2])
+                height, width = pixels.shape[:2]
+            texture = self.ctx.texture(
+                (width, height),
+                4,
+                np.ascontiguousarray(pixels),
+                internal_format=SRGB8_ALPHA8 if srgb else None,
+            )
+            texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+            if self._mipmaps:
+                texture.build_mipmaps()
+                texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+            self._textures[key] = self._own(texture)
+        return self._textures[key]
+
+    def _own(self, made: Owned) -> Owned:
+        self._owned.append(made)
+        return made
+
+
+def vertex_data(plant: Plant, origin: FloatArray) -> npt.NDArray[np.float32]:
+    """(v, 12) float32: position relative to origin, u, normal, v, linear colour factors."""
+    data = np.empty((len(plant.positions), VERTEX_FLOATS), dtype=np.float32)
+    data[:, 0:3] = plant.positions - origin
+    data[:, 3] = plant.uvs[:, 0]
+    data[:, 4:7] = plant.normals
+    data[:, 7] = plant.uvs[:, 1]
+    data[:, 8:12] = 1.0 if plant.colors is None else plant.colors
+    return data
+
+
+def bled_under_alpha(pixels: ByteArray) -> ByteArray:
+    """The image with the first ring of texels under alpha 0 given their neighbours' mean colour.
+
+    One ring is all that bilinear filtering without mips can reach, and it costs milliseconds.
+    """
+    height, width = pixels.shape[:2]
+    clear = pixels[..., 3] == 0
+    if not clear.any() or clear.all():
+        return pixels
+    shown = np.pad(~clear, 1, mode="wrap")
+    steps = [(dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if dy or dx]
+    touched = np.zeros_like(clear)
+    for dy, dx in steps:
+        touched |= shown[1 + dy : 1 + dy + height, 1 + dx : 1 + dx + width]
+    rows, columns = np.nonzero(clear & touched)
+    total = np.zeros((len(rows), 3), dtype=np.int32)
+    count = np.zeros(len(rows), dtype=np.int32)
+    for dy, dx in steps:
+        y, x = (rows + dy) % height, (columns + dx) % width
+        weight = ~clear[y, x]
+        total += pixels[y, x, :3] * weight[:, None]
+        count += weight
+    result = np.array(pixels)
+    result[rows, columns, :3] = (total + count[:, None] // 2) // count[:, None]
+    return result
