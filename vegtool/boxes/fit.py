@@ -1,0 +1,187 @@
+"""Oriented boxes of least volume, by turning a first box until none of its neighbours is smaller.
+
+Paper: Colditz, Coconu, Deussen, Hege: Real-time rendering of complex photorealistic landscapes
+using hybrid level-of-detail approaches (2005), section 2.1: a first box is jittered in steps of
+one degree. Here the steps go from coarse to fine, which leaves the local minima that single
+one-degree steps stick in, all neighbours of all boxes are tried at once, and a grid of starts
+precedes them. Only points that can touch a box take part: the extreme ones in many directions,
+after the cluster has been stretched to equal spread along its principal axes. The box that comes
+out is measured on all points.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+
+from vegtool.arrays import FloatArray, IntArray
+from vegtool.boxes.box import MIN_EXTENT, Boxes
+from vegtool.boxes.groups import Groups
+from vegtool.boxes.options import BoxOptions
+
+DIRECTIONS = 64
+"""Directions in which the extreme points are sought, at both ends."""
+LEAST_SPREAD = 1e-6
+"""Standard deviation, as a fraction of the largest, below which a cluster counts as flat there."""
+TURNS_PER_STEP = 12
+"""Turns taken at most at one angle before going on to the next finer one."""
+BATCH = 32
+"""Clusters searched together: their products stay in the processor's cache."""
+STARTS = 3
+"""Starts that are followed for each cluster: the principal axes and the best of a grid."""
+
+
+def fit_boxes(
+    points: FloatArray, cluster: IntArray, count: int, options: BoxOptions | None = None
+) -> Boxes:
+    """The box of nearly least volume around the points of each cluster.
+
+    points: (n, 3) metres. cluster: (n,) 0..count-1. Returns `count` boxes, axes from longest to
+    shortest, half extents 0 where a cluster is flat; a cluster without points gets a box of no
+    size at the origin. Extents below MIN_EXTENT of the cluster's diagonal (twice the greatest
+    distance from its mean) count as that long where volumes are compared.
+    """
+    options = options or BoxOptions()
+    center, half = np.zeros((count, 3)), np.zeros((count, 3))
+    axes = np.tile(np.eye(3), (count, 1, 1))
+    if not len(points):
+        return Boxes(center, axes, half)
+    groups = Groups(cluster)
+    origin, scale, local = centred(points, groups)
+    frames, spread = principal_axes(local, groups)
+    found = np.empty_like(frames)
+    support = support_points(local, groups, frames, spread)
+    by_size = np.argsort([len(s) for s in support], kind="stable")
+    for start in range(0, len(groups), BATCH):
+        batch = by_size[start : start + BATCH]
+        found[batch] = search([support[i] for i in batch], options.steps_deg) @ frames[batch]
+    low, high = extents(local, groups, found)
+    here = groups.present
+    axes[here], half[here] = longest_first(found, (high - low) / 2 * scale[:, None])
+    middle = np.einsum("gi,gij->gj", (high + low) / 2, found)
+    center[here] = origin + middle * scale[:, None]
+    return Boxes(center, axes, half)
+
+
+def centred(points: FloatArray, groups: Groups) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Origin (g, 3) and scale (g,) of each group, and its points about the mean within radius 1."""
+    first = points[groups.order[groups.starts[:-1]]]
+    local = points[groups.order] - groups.spread(first)  # before summing: keeps all digits
+    mean = groups.sum(local) / np.diff(groups.starts)[:, None]
+    local -= groups.spread(mean)
+    scale = np.sqrt(groups.greatest(np.einsum("ni,ni->n", local, local)))
+    scale[scale == 0] = 1.0
+    local /= groups.spread(scale)[:, None]
+    return first + mean, scale, local
+
+
+def principal_axes(local: FloatArray, groups: Groups) -> tuple[FloatArray, FloatArray]:
+    """Rows (g, 3, 3) of rotations to the principal axes, and the standard deviations (g, 3)."""
+    outer = local[:, :, None] * local[:, None, :]
+    scatter = groups.sum(outer) / np.diff(groups.starts)[:, None, None]
+    values, vectors = np.linalg.eigh(scatter)
+    axes = np.swapaxes(vectors, 1, 2)[:, ::-1].copy()
+    axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
+    return axes, np.sqrt(np.maximum(values[:, ::-1], 0.0))
+
+
+def support_points(
+    local: FloatArray, groups: Groups, frames: FloatArray, spread: FloatArray
+) -> list[FloatArray]:
+    """Points (m, 3), in the principal frame, that are extreme in some direction, per group."""
+    directions = even_directions(DIRECTIONS)
+    widest = np.where(spread[:, :1] > 0, spread[:, :1], 1.0)
+    stretch = 1 / np.maximum(spread, LEAST_SPREAD * widest)
+    towards = np.einsum("di,gi,gij->gdj", directions, stretch, frames)
+    found = []
+    for part, frame, toward in zip(groups.slices(), frames, towards, strict=True):
+        points = local[part]
+        if len(points) > 2 * DIRECTIONS:
+            along = np.einsum("dj,nj->dn", toward, points)
+            points = points[np.unique([along.argmax(axis=1), along.argmin(axis=1)])]
+        found.append(np.einsum("nj,ij->ni", points, frame))
+    return found
+
+
+def even_directions(count: int) -> FloatArray:
+    """Unit vectors (count, 3) spread evenly over half a sphere, on a golden spiral."""
+    i = np.arange(count) + 0.5
+    z = 1 - i / count
+    turn = np.pi * (1 + 5**0.5) * i
+    r = np.sqrt(1 - z * z)
+    return np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1)
+
+
+def search(support: list[FloatArray], steps_deg: tuple[float, ...]) -> FloatArray:
+    """Rotations (g, 3, 3), rows are axes, of the smallest boxes found around each set of points."""
+    width = max(len(s) for s in support)
+    points = np.stack([np.concatenate([s, np.repeat(s[:1], width - len(s), 0)]) for s in support])
+    grid = START_GRID
+    volumes = box_volumes(np.tile(grid, (len(points), 1, 1, 1)), points)
+    volumes[:, 0] = -1.0  # the principal axes are always one of the starts
+    best = np.argsort(volumes, axis=1, kind="stable")[:, :STARTS]
+    rotation = grid[best].reshape(-1, 3, 3)
+    points = np.repeat(points, STARTS, axis=0)
+    least = box_volumes(rotation[:, None], points)[:, 0]
+    for degrees in steps_deg:
+        turns = rotations(NEIGHBOURS * np.radians(degrees))
+        active = np.arange(len(points))
+        for _ in range(TURNS_PER_STEP):
+            tried = turns @ rotation[active, None]
+            volumes = box_volumes(tried, points[active])
+            best = volumes.argmin(axis=1)
+            smallest = volumes[np.arange(len(active)), best]
+            better = smallest < least[active] * (1 - 1e-9)
+            rows = active[better]
+            rotation[rows] = tried[better, best[better]]
+            least[rows] = smallest[better]
+            active = rows
+            if not len(active):
+                break
+    winner = least.reshape(-1, STARTS).argmin(axis=1)
+    return np.asarray(rotation.reshape(-1, STARTS, 3, 3)[np.arange(len(winner)), winner])
+
+
+def box_volumes(rotation: FloatArray, points: FloatArray) -> FloatArray:
+    """(g, r) volumes of the boxes along rotations (g, r, 3, 3) around points (g, m, 3)."""
+    g, r = rotation.shape[:2]
+    along = rotation.reshape(g, 3 * r, 3) @ np.swapaxes(points, 1, 2)
+    extent = along.max(axis=2) - along.min(axis=2)
+    return np.asarray(np.maximum(extent, 2 * MIN_EXTENT).reshape(g, r, 3).prod(axis=2))
+
+
+def rotations(vectors: FloatArray) -> FloatArray:
+    """Rotation matrices (r, 3, 3) about vectors (r, 3) by their length in radians (Rodrigues)."""
+    angle = np.linalg.norm(vectors, axis=1)[:, None, None]
+    x, y, z = (vectors / np.where(angle[:, 0] > 0, angle[:, 0], 1.0)).T
+    zero = np.zeros_like(x)
+    k = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
+    return np.asarray(np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * (k @ k))
+
+
+def extents(local: FloatArray, groups: Groups, axes: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Least and greatest coordinate (g, 3) of each group's points along its axes."""
+    low, high = np.empty((len(groups), 3)), np.empty((len(groups), 3))
+    for i, part in enumerate(groups.slices()):
+        along = np.einsum("ij,nj->in", axes[i], local[part])
+        low[i], high[i] = along.min(axis=1), along.max(axis=1)
+    return low, high
+
+
+def longest_first(axes: FloatArray, half: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Axes and half extents in descending order, right-handed, with signs that are always alike."""
+    order = np.argsort(-half, axis=1, kind="stable")
+    half = np.take_along_axis(half, order, axis=1)
+    axes = np.take_along_axis(axes, order[:, :, None], axis=1)
+    largest = np.take_along_axis(axes, np.abs(axes).argmax(axis=2)[:, :, None], axis=2)
+    axes = np.where(largest < 0, -axes, axes)
+    axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
+    return axes, half
+
+
+NEIGHBOURS = np.array([n for n in product((-1.0, 0.0, 1.0), repeat=3) if any(n)])
+"""(26, 3) rotation vectors to all neighbours of a box, in steps."""
+_angles = np.radians([0.0, -22.5, 22.5, -45.0, 45.0])
+START_GRID = rotations(np.array(list(product(_angles, repeat=3))))
+"""(125, 3, 3) rotations about the principal axes; the first one is none."""

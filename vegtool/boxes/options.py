@@ -1,0 +1,34 @@
+"""What the fitting of boxes and the choice of shapes can be told, with defaults and units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Shape = Literal["auto", "single", "crossed"]
+PlaneFit = Literal["volume", "orientation"]
+
+
+@dataclass(frozen=True)
+class BoxOptions:
+    """Options of the room.
+
+    shape: "single" shows every cluster on one billboard, "crossed" on two or three crossed ones,
+    "auto" decides by the form of its box.
+    plane: "volume" fits the box of least volume (the paper's form); "orientation" takes the plane
+    that suits the directions of the faces too (DESIGN, section 4 item 2).
+    flat_ratio: a box is flat where its least extent is below this fraction of its middle one. A
+    plane through a box of that form errs by at most a quarter of the picture's shorter side.
+    long_ratio: a box is long and thin where its middle extent is below this fraction of its
+    longest. The third crossed plane, across the axis, would then show less than a quarter of the
+    area of the others.
+    steps_deg: angles, in degrees, of the rotations tried, coarse to fine. The paper turns in steps
+    of one degree; the coarse ones leave local minima, and the halves sharpen flat boxes, whose
+    thinnest side grows by a third when they are one degree off.
+    """
+
+    shape: Shape = "auto"
+    plane: PlaneFit = "volume"
+    flat_ratio: float = 0.25
+    long_ratio: float = 0.25
+    steps_deg: tuple[float, ...] = (16.0, 8.0, 4.0, 2.0, 1.0, 0.5, 0.25)
