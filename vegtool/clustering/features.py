@@ -1,0 +1,127 @@
+"""What the clustering methods see of a plant: weighted points in a feature space.
+
+A face is nine numbers: its centroid, and the tensor n n^T of its normal (which does not tell front
+from back). Off-diagonals are scaled by sqrt 2, so that Euclidean distance is Frobenius distance.
+Positions are in plant radii from the centre; the tensor is scaled by the orientation weight.
+
+Points stand for one or more faces, so that the cost of clustering does not grow with the plant:
+the halves of a quad are one *piece* (which also keeps a leaf card on one billboard), equal faces
+are one, and where there are still too many, `coarse` joins those that share a grid cell.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+import numpy.typing as npt
+
+from vegtool.arrays import FloatArray, unit
+from vegtool.plant import Plant
+
+SAME = 1e-9  # plant radii: features closer than this, per axis, are the same
+PARALLEL = 0.99  # cosine: halves of a quad may be bent by 8 degrees
+LIGHTEST = 1e-6  # of the mean face: the weight of faces without area
+
+Labels = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Distinct weighted points, and which of them each face became.
+
+    points: (n, 9) plant radii, pairwise different. weights: (n,) positive, sum 1.
+    of_face: (f,) index into points.
+    """
+
+    points: FloatArray
+    weights: FloatArray
+    of_face: Labels
+
+
+def face_features(plant: Plant, orientation_weight: float) -> FloatArray:
+    """(f, 9) plant radii: centroid and scaled normal tensor of every face; see the module."""
+    scale = plant.radius or 1.0
+    position = (plant.corners - plant.center).mean(axis=1) / scale
+    x, y, z = unit(plant.face_area_vectors / scale**2).T
+    root2 = sqrt(2)
+    tensor = np.stack([x * x, y * y, z * z, root2 * x * y, root2 * x * z, root2 * y * z], axis=1)
+    return np.concatenate([position, orientation_weight * tensor], axis=1)
+
+
+def face_weights(plant: Plant) -> FloatArray:
+    """(f,) share of the plant's area, at least LIGHTEST of the mean; equal if there is no area."""
+    areas = plant.face_areas / (plant.radius or 1.0) ** 2
+    mean = areas.mean()
+    if mean == 0:
+        return np.full(len(areas), 1 / len(areas))
+    weights = np.maximum(areas / mean, LIGHTEST)
+    return np.asarray(weights / weights.sum())
+
+
+def samples(plant: Plant, orientation_weight: float, count: int) -> Samples:
+    """The plant's pieces as points, or its faces where `count` asks for more than pieces."""
+    features = face_features(plant, orientation_weight)
+    weights = face_weights(plant)
+    pieces = _grouped(features, weights, quads(plant))
+    pieces = _merged(pieces, cells(pieces.points, SAME))
+    if len(pieces.points) >= count:
+        return pieces
+    return _grouped(features, weights, cells(features, SAME))
+
+
+def coarse(fine: Samples, limit: int) -> Samples:
+    """`fine` with the points that share a grid cell made one, if there are more than `limit`."""
+    edge, result = 1 / 128, fine
+    while len(result.points) > limit:
+        result = _merged(fine, cells(fine.points, edge))
+        edge *= 1.25
+    return result
+
+
+def quads(plant: Plant) -> Labels:
+    """(f,) piece of each face: faces that share their longest edge, by position, and are parallel.
+
+    The longest edge of a quad's halves is its diagonal. Faces need not share vertex indices.
+    """
+    corners = plant.corners
+    edges = corners - np.roll(corners, 1, axis=1)
+    longest = np.einsum("fij,fij->fi", edges, edges).argmax(axis=1)
+    rows = np.arange(len(corners))
+    middle = corners[rows, longest] + corners[rows, longest - 1]  # a + b equals b + a exactly
+    group = _same_rows((middle + 0.0).view(np.int64))  # + 0.0: no negative zero
+    first = np.full(group.max() + 1, len(rows))
+    np.minimum.at(first, group, rows)
+    leader = first[group]
+    normal = unit(plant.face_area_vectors / (plant.radius or 1.0) ** 2)
+    parallel = np.abs(np.einsum("fi,fi->f", normal, normal[leader])) > PARALLEL
+    return np.unique(np.where(parallel, leader, rows), return_inverse=True)[1]
+
+
+def cells(points: FloatArray, edge: float) -> Labels:
+    """(n,) which cell, of that edge length, of a grid in feature space each point lies in."""
+    return _same_rows(np.floor(points / edge + 0.5).astype(np.int64))
+
+
+def _same_rows(rows: npt.NDArray[np.int64]) -> Labels:
+    """(n,) group of equal rows; by 64-bit hash (a collision, 1 in 1e7 plants, joins two groups)."""
+    mixed = np.zeros(len(rows), dtype=np.uint64)
+    for column in rows.T:
+        mixed ^= column.astype(np.uint64)
+        mixed *= np.uint64(0x9E3779B97F4A7C15)
+        mixed ^= mixed >> np.uint64(29)
+    return np.unique(mixed, return_inverse=True)[1]
+
+
+def _grouped(points: FloatArray, weights: FloatArray, group: Labels) -> Samples:
+    """Weighted means of the points of each group."""
+    total: FloatArray = np.bincount(group, weights).astype(np.float64)
+    means = [np.bincount(group, weights * column) / total for column in points.T]
+    return Samples(np.stack(means, axis=1), total, group)
+
+
+def _merged(fine: Samples, group: Labels) -> Samples:
+    """`_grouped` for points that are groups of faces already."""
+    result = _grouped(fine.points, fine.weights, group)
+    return Samples(result.points, result.weights, group[fine.of_face])
