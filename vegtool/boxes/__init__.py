@@ -1,7 +1,9 @@
 """Labels become oriented boxes, and boxes single or crossed billboards."""
 
-from vegtool.boxes.billboards import make_billboards, planes_per_box
+from vegtool.boxes.billboards import make_billboards, planes_per_cluster
 from vegtool.boxes.box import Boxes
+from vegtool.boxes.budget import fit_budget
+from vegtool.boxes.error import geometric_error
 from vegtool.boxes.fit import fit_boxes
 from vegtool.boxes.options import BoxOptions
 from vegtool.boxes.planes import oriented_planes
@@ -10,7 +12,9 @@ __all__ = [
     "BoxOptions",
     "Boxes",
     "fit_boxes",
+    "fit_budget",
+    "geometric_error",
     "make_billboards",
     "oriented_planes",
-    "planes_per_box",
+    "planes_per_cluster",
 ]

@@ -59,16 +59,30 @@ def cluster_boxes(plant: Plant, labels: IntArray, count: int, options: BoxOption
     return fit_boxes(plant.corners.reshape(-1, 3), np.repeat(labels, 3), count, options)
 
 
+def planes_per_cluster(
+    plant: Plant, labels: IntArray, options: BoxOptions | None = None
+) -> IntArray:
+    """(k,) int32: how many billboards each cluster takes, 0 where it has no faces."""
+    options = options or BoxOptions()
+    count = int(labels.max()) + 1
+    planes = planes_per_box(cluster_boxes(plant, labels, count, options), options)
+    return np.where(np.bincount(labels, minlength=count) > 0, planes, 0).astype(np.int32)
+
+
 def planes_per_box(boxes: Boxes, options: BoxOptions) -> IntArray:
     """(k,) int32: 1, 2 or 3 billboards for each box, by its form."""
-    longest, middle = boxes.half[:, 0], boxes.half[:, 1]
-    least = boxes.half[:, 2]
-    crossed = np.where(middle < options.long_ratio * longest, 2, 3)
+    longest, middle, least = boxes.half.T
     if options.shape == "single":
         return np.ones(len(boxes), dtype=np.int32)
-    if options.shape == "crossed":
-        return crossed.astype(np.int32)
-    return np.where(least <= options.flat_ratio * middle, 1, crossed).astype(np.int32)
+    crossed = np.where(ratio(middle, longest) < options.long_ratio, 2, 3)
+    if options.shape == "auto":
+        crossed = np.where(ratio(least, middle) < options.flat_ratio, 1, crossed)
+    return crossed.astype(np.int32)
+
+
+def ratio(short: FloatArray, long: FloatArray) -> FloatArray:
+    """short / long, and 0 where both are."""
+    return np.divide(short, long, out=np.zeros_like(short), where=long > 0)
 
 
 def cut_planes(plant: Plant, labels: IntArray, boxes: Boxes, planes: IntArray) -> Billboards:
