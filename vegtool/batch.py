@@ -1,0 +1,173 @@
+"""Files in, files out: one plant file converted and written, and many of them side by side.
+
+One bad file does not stop the others, and each file's outputs appear whole or not at all.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from vegtool.convert import ConvertOptions, convert, plan_levels
+from vegtool.errors import InputError, UsageError, VegtoolError
+from vegtool.formats import READERS, ReadOptions, read_plant
+from vegtool.lod import LodChain
+from vegtool.progress import Progress, silent
+
+
+@dataclass(frozen=True)
+class Job:
+    """One file to convert, and the name that its outputs carry."""
+
+    source: Path
+    name: str
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a job: the files written and a row per level, or the error."""
+
+    job: Job
+    files: tuple[Path, ...] = ()
+    levels: tuple[dict[str, Any], ...] = ()
+    notes: tuple[str, ...] = ()
+    seconds: float = 0.0
+    error: str | None = None
+    exit_code: int = 0
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is done with every file of a batch."""
+
+    folder: Path
+    read: ReadOptions = field(default_factory=ReadOptions)
+    convert: ConvertOptions = field(default_factory=ConvertOptions)
+    force: bool = False
+    depth: bool = False
+    dry_run: bool = False
+
+
+def find_jobs(inputs: Sequence[Path]) -> list[Job]:
+    """The model files named, or found directly inside the folders named, in order.
+
+    Two files of the same stem get the extension into their names (oak.glb, oak.obj: oak_glb,
+    oak_obj). Raises InputError for a path that is not there or a folder without models.
+    """
+    sources: list[Path] = []
+    for path in inputs:
+        if path.is_dir():
+            models = sorted(p for p in path.iterdir() if p.suffix.lower() in READERS)
+            if not models:
+                known = " ".join(READERS)
+                raise InputError(f"{path}: expected models ({known}) in this folder, found none")
+            sources += models
+        else:
+            sources.append(path)
+    unique = list(dict.fromkeys(sources))
+    stems = [p.stem.lower() for p in unique]
+    jobs = [
+        Job(p, p.stem if stems.count(s) == 1 else f"{p.stem}_{p.suffix[1:].lower()}")
+        for p, s in zip(unique, stems, strict=True)
+    ]
+    names = [job.name.lower() for job in jobs]
+    twice = next((job for job in jobs if names.count(job.name.lower()) > 1), None)
+    if twice:
+        raise UsageError(
+            f"{twice.source}: another input would write files of the same name ({twice.name});"
+            " convert them into folders of their own"
+        )
+    return jobs
+
+
+def convert_file(job: Job, task: Task, progress: Progress = silent) -> Outcome:
+    """Read one file, convert it, write its levels, its manifest and its contact sheet.
+
+    Raises the errors of reading, converting and writing; then nothing was written.
+    """
+    start = perf_counter()
+    progress("reading", 0.0)
+    plant = read_plant(job.source, task.read)
+    if task.dry_run:
+        rows = tuple(_planned(plan) for plan in plan_levels(plant, task.convert, progress))
+        return Outcome(job, (), rows, plant.notes, perf_counter() - start)
+    from vegtool.formats.gltf import write_chain
+    from vegtool.measure.contact_sheet import contact_sheet
+
+    chain = convert(plant, task.convert, lambda s, f: progress(s, 0.05 + 0.75 * f))
+    chain = LodChain(job.name, chain.levels, chain.display, chain.seed, chain.options)
+    progress("contact sheet", 0.8)
+    sheet = contact_sheet(chain)
+    progress("writing", 0.9)
+    files = write_chain(
+        chain, task.folder, task.force, task.depth, {f"{job.name}.png": sheet}, job.source
+    )
+    progress("done", 1.0)
+    rows = tuple(_made(chain, i) for i in range(len(chain.levels)))
+    return Outcome(job, tuple(files), rows, plant.notes, perf_counter() - start)
+
+
+def convert_files(
+    jobs: Sequence[Job],
+    task: Task,
+    workers: int,
+    progress: Callable[[Job], Progress] = lambda job: silent,
+) -> Iterator[Outcome]:
+    """Convert a batch in the order given; an error becomes part of that file's outcome."""
+    if workers <= 1 or len(jobs) == 1:
+        for job in jobs:
+            yield _outcome(job, task, progress(job))
+        return
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
+    # spawn: a GL context does not survive a fork
+    with ProcessPoolExecutor(min(workers, len(jobs)), get_context("spawn")) as pool:
+        futures = [pool.submit(_outcome, job, task) for job in jobs]
+        try:
+            for done, (job, future) in enumerate(zip(jobs, futures, strict=True), start=1):
+                yield future.result()
+                progress(job)("done", done / len(jobs))
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+
+
+def _outcome(job: Job, task: Task, progress: Progress = silent) -> Outcome:
+    try:
+        return convert_file(job, task, progress)
+    except VegtoolError as error:
+        return Outcome(job, error=str(error), exit_code=error.exit_code)
+    except MemoryError:
+        message = f"{job.source}: not enough memory; fewer billboards or --max-texture need less"
+        return Outcome(job, error=message, exit_code=1)
+
+
+def _planned(plan: Any) -> dict[str, Any]:
+    return {
+        "billboards": len(plan.billboards),
+        "near_distance_m": plan.near_distance_m,
+        "texels_per_metre": plan.texels_per_metre,
+    }
+
+
+def _made(chain: LodChain, index: int) -> dict[str, Any]:
+    level = chain.levels[index]
+    return {
+        "level": index,
+        "kind": level.kind,
+        "billboards": 0 if level.billboards is None else len(level.billboards),
+        "triangles": level.triangles,
+        "texels": level.texels,
+        "near_distance_m": round(level.near_distance_m, 4),
+        "seconds": {k: round(v, 4) for k, v in level.seconds.items()},
+    }
+
+
+def default_workers() -> int:
+    """Workers of a batch where none are asked for: one per processor, four at most."""
+    return min(4, os.cpu_count() or 1)

@@ -1,0 +1,269 @@
+"""The command line: parse, call, print; nothing else.
+
+Exit codes: 0 done, 1 failed, 2 usage, 3 part of a batch failed, 4 a quality limit missed,
+5 a capability missing, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from vegtool import __version__
+from vegtool.console import Console, human_bytes, table
+from vegtool.convert import ConvertOptions
+from vegtool.errors import BatchError, VegtoolError
+from vegtool.flags import flags, read_config
+from vegtool.formats import ReadOptions
+
+app = typer.Typer(
+    name="vegtool",
+    help="Plant models in, levels of detail out.",
+    no_args_is_help=True,
+    add_completion=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    rich_markup_mode="rich",
+)
+
+INTERRUPTED = 130
+
+Out = Annotated[Path, typer.Option("-o", "--out", help="Folder for what is made.")]
+Force = Annotated[bool, typer.Option("-f", "--force", help="Overwrite files of the same names.")]
+Json = Annotated[bool, typer.Option("--json", help="The result as JSON on stdout.")]
+Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Errors only.")]
+Verbose = Annotated[int, typer.Option("-v", "--verbose", count=True, help="Say more; -vv most.")]
+Config = Annotated[
+    Path | None,
+    typer.Option(
+        "--config",
+        help="A TOML file with values for these options.",
+        metavar="FILE.toml",
+        is_eager=True,
+        callback=read_config,
+    ),
+]
+
+
+@app.callback(invoke_without_command=True)
+def root(
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+) -> None:
+    """Plant models in, levels of detail out."""
+    if version:
+        print(f"vegtool {__version__}")
+        raise typer.Exit
+
+
+@app.command("convert")
+@flags
+def convert_command(
+    *,
+    inputs: Annotated[list[Path], typer.Argument(help="Plant models, or folders of them.")],
+    out: Out,
+    convert: ConvertOptions,
+    read: ReadOptions,
+    jobs: Annotated[int, typer.Option("-j", "--jobs", help="Files at a time.", min=1)] = 1,
+    depth: Annotated[bool, typer.Option("--depth", help="Write depth textures too.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be made.")] = False,
+    force: Force = False,
+    json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = 0,
+    config: Config = None,
+) -> None:
+    """Make levels of detail of plant models.
+
+    Writes a GLB per level, one combined GLB with MSFT_lod, a manifest and a contact sheet.
+
+    [bold]Examples[/bold]
+
+        vegtool convert oak.glb -o out/
+
+        vegtool convert models/ -o out/ -j 4 --method branches --billboards 256
+    """
+    from vegtool.batch import Task, convert_files, find_jobs
+
+    console = Console(-1 if quiet else verbose, json)
+    task = Task(out, read, convert, force, depth, dry_run)
+    outcomes = []
+    todo = find_jobs(inputs)
+    with console.bar("convert") as progress:
+        for outcome in convert_files(todo, task, jobs, _file_progress(todo, progress)):
+            outcomes.append(outcome)
+    for outcome in outcomes:
+        if outcome.error:
+            console.say(f"error: {outcome.error}", at=-1)
+            continue
+        for note in outcome.notes:
+            console.say(f"{outcome.job.name}: {note}")
+    console.result([_as_json(o) for o in outcomes], _summary(outcomes, console))
+    failed = [o for o in outcomes if o.error]
+    if len(outcomes) == 1 and failed:
+        raise typer.Exit(failed[0].exit_code)
+    if failed:
+        names = ", ".join(str(o.job.source) for o in failed)
+        raise BatchError(f"{len(failed)} of {len(outcomes)} inputs failed: {names}")
+
+
+@app.command("inspect")
+@flags
+def inspect_command(
+    *,
+    model: Annotated[Path, typer.Argument(help="A plant model.")],
+    read: ReadOptions,
+    branches: Annotated[
+        Path | None,
+        typer.Option("--branches", help="Write face_branch, parent, level.", metavar="FILE.npz"),
+    ] = None,
+    force: Force = False,
+    json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = 0,
+) -> None:
+    """Show what is read from a model: triangles, materials, alpha, branches, bounds, warnings.
+
+    [bold]Examples[/bold]
+
+        vegtool inspect oak.glb
+
+        vegtool inspect oak.obj --unit cm --branches oak_branches.npz
+    """
+    from vegtool.inspect import inspect_plant, inspection_text
+
+    console = Console(-1 if quiet else verbose, json)
+    with console.bar("inspect") as progress:
+        inspection = inspect_plant(model, read, branches, force, progress)
+    console.result(inspection, inspection_text(inspection))
+
+
+@app.command("doctor")
+def doctor_command(*, json: Json = False) -> None:
+    """Check what this machine can do: drawing, optional parts, and the remedy where one is missing."""
+    from vegtool.doctor import diagnose
+
+    checks = diagnose()
+    rows = [("ok" if c.ok else "missing", c.name, c.found, c.remedy) for c in checks]
+    Console(0, json).result(
+        [c.__dict__ for c in checks], table(("", "part", "found", "remedy"), rows)
+    )
+    if not all(c.ok for c in checks if c.required):
+        raise typer.Exit(5)
+
+
+@app.command("sample")
+def sample_command(
+    *,
+    name: Annotated[str, typer.Argument(help="Which plant; --list shows them.")] = "",
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="File to write.", metavar="FILE.glb")
+    ] = None,
+    triangles: Annotated[int | None, typer.Option("-t", "--triangles", help="About how many.")] = None,
+    seed: Annotated[int, typer.Option("--seed", help="Another seed, another individual.")] = 0,
+    list_: Annotated[bool, typer.Option("--list", help="List the samples.")] = False,
+    force: Force = False,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Write a procedural plant, with its branches, to try things on.
+
+    [bold]Examples[/bold]
+
+        vegtool sample broadleaf
+
+        vegtool sample conifer --triangles 50000 -o pine.glb
+    """
+    from vegtool.growth import SAMPLES, sample
+
+    console = Console(-1 if quiet else 0, json)
+    if list_ or not name:
+        console.result(dict(SAMPLES), table(("sample", "what it is"), list(SAMPLES.items())))
+        return
+    from vegtool.formats.atomic import FileSet
+    from vegtool.formats.gltf import plant_glb
+
+    target = out or Path(f"{name}.glb")
+    plant = sample(name, triangles, seed)
+    data = plant_glb(plant)
+    with FileSet(target.parent, force) as files:
+        files.add(target.name, data)
+    facts = {"file": str(target), "triangles": len(plant.faces), "bytes": len(data)}
+    console.result(facts, f"{target}: {len(plant.faces):,} triangles, {human_bytes(len(data))}")
+
+
+def _file_progress(todo: list[Any], progress: Any) -> Any:
+    """Each file's own progress as its share of the whole batch's."""
+
+    def of(job: Any) -> Any:
+        index = todo.index(job)
+        return lambda stage, fraction: progress(
+            f"{job.name}: {stage}", (index + fraction) / len(todo)
+        )
+
+    return of
+
+
+def _as_json(outcome: Any) -> dict[str, Any]:
+    return {
+        "source": str(outcome.job.source),
+        "files": [str(f) for f in outcome.files],
+        "levels": list(outcome.levels),
+        "notes": list(outcome.notes),
+        "seconds": round(outcome.seconds, 3),
+        "error": outcome.error,
+    }
+
+
+def _summary(outcomes: list[Any], console: Console) -> str:
+    blocks = []
+    for outcome in outcomes:
+        if outcome.error:
+            continue
+        shown = [{k: v for k, v in row.items() if k != "seconds"} for row in outcome.levels]
+        head = list(shown[0])
+        rows = [[f"{v:,}" if isinstance(v, int) else v for v in row.values()] for row in shown]
+        title = f"{outcome.job.name}  ({outcome.seconds:.1f} s)"
+        blocks.append(f"{title}\n{table([h.replace('_', ' ') for h in head], rows)}")
+        if outcome.files:
+            blocks[-1] += "\n" + "\n".join(f"  {f}" for f in outcome.files[-3:])
+    return "\n\n".join(blocks)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line and exit with its code."""
+    sys.exit(run(arguments))
+
+
+def run(arguments: list[str] | None = None) -> int:
+    """Run the command line and return its exit code; every error is a sentence on stderr."""
+    given = sys.argv[1:] if arguments is None else arguments
+    try:
+        result = typer.main.get_command(app).main(given, prog_name="vegtool", standalone_mode=False)
+        return result if isinstance(result, int) else 0
+    except typer.TyperException as error:
+        print(f"error: {error.format_message()} (vegtool --help lists what there is)", file=sys.stderr)
+        return error.exit_code
+    except (KeyboardInterrupt, typer.Abort):
+        print("interrupted: nothing is left half-written", file=sys.stderr)
+        return INTERRUPTED
+    except VegtoolError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return error.exit_code
+    except BrokenPipeError:
+        return 0
+    except Exception as error:
+        if "-vv" in given:
+            raise
+        print(
+            f"error: vegtool failed on something it does not know ({type(error).__name__}: {error});"
+            " this is a bug: run again with -vv and report what it prints",
+            file=sys.stderr,
+        )
+        return 1
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,75 @@
+"""What this machine can do, one line each, with the remedy where something is missing."""
+
+from __future__ import annotations
+
+import platform
+import shutil
+import sys
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
+
+from vegtool import __version__
+from vegtool.errors import CapabilityError
+
+
+@dataclass(frozen=True)
+class Check:
+    """One part: whether it is there, what was found, and what to do if it is not."""
+
+    name: str
+    ok: bool
+    found: str
+    remedy: str = ""
+    required: bool = False
+
+
+OPTIONAL_PACKAGES = {
+    "DracoPy": ("reads Draco-compressed glTF", "pip install 'vegtool[draco]'"),
+}
+
+OPTIONAL_PROGRAMS = {
+    "gltfpack": ("decompresses meshopt glTF, simplifies meshes", "npm install -g gltfpack"),
+}
+
+
+def diagnose() -> list[Check]:
+    """All checks, the required ones first."""
+    return [_python(), *_drawing(), *_packages(), *_programs()]
+
+
+def _python() -> Check:
+    found = f"Python {platform.python_version()}, vegtool {__version__}, {platform.system()}"
+    return Check("python", sys.version_info >= (3, 11), found, required=True)
+
+
+def _drawing() -> list[Check]:
+    from vegtool.gl.context import describe
+
+    try:
+        about = describe()
+    except CapabilityError as error:
+        return [Check("drawing", False, "no OpenGL context", str(error), required=True)]
+    return [
+        Check(f"drawing: {name}", True, str(value), required=True) for name, value in about.items()
+    ]
+
+
+def _packages() -> list[Check]:
+    checks = []
+    for name, (purpose, remedy) in OPTIONAL_PACKAGES.items():
+        try:
+            import_module(name)
+            checks.append(Check(name, True, f"{version(name)}: {purpose}"))
+        except (ImportError, PackageNotFoundError):
+            checks.append(Check(name, False, f"optional: {purpose}", remedy))
+    return checks
+
+
+def _programs() -> list[Check]:
+    checks = []
+    for name, (purpose, remedy) in OPTIONAL_PROGRAMS.items():
+        path = shutil.which(name)
+        found = f"{path}: {purpose}" if path else f"optional: {purpose}"
+        checks.append(Check(name, path is not None, found, "" if path else remedy))
+    return checks

@@ -1,0 +1,102 @@
+"""Command line flags made from options dataclasses, so that no option is declared twice.
+
+A command names an options dataclass as the annotation of a parameter; `flags` takes that parameter
+apart into one flag per field, with the field's default, help and limits, and puts the dataclass
+together again before the command runs.
+"""
+
+from __future__ import annotations
+
+import inspect
+import tomllib
+from collections.abc import Callable
+from dataclasses import fields, is_dataclass
+from functools import wraps
+from pathlib import Path
+from typing import Annotated, Any, Literal, get_type_hints
+
+import typer
+
+from vegtool.errors import UsageError
+from vegtool.options import check_limits, default_of, flag_of
+
+
+def flags(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command one flag per field of each options dataclass among its parameters."""
+    hints = get_type_hints(command, include_extras=True)
+    parameters: list[inspect.Parameter] = []
+    groups: dict[str, Any] = {}
+    for parameter in inspect.signature(command).parameters.values():
+        kind = hints[parameter.name]
+        if not is_dataclass(kind):
+            parameters.append(parameter.replace(annotation=kind))
+            continue
+        groups[parameter.name] = kind
+        field_hints = get_type_hints(kind)
+        parameters += [_flag(item, field_hints[item.name], kind.__name__) for item in fields(kind)]
+
+    @wraps(command)
+    def run(**values: Any) -> None:
+        for name, kind in groups.items():
+            given = {item.name: values.pop(item.name) for item in fields(kind)}
+            options = kind(**{k: tuple(v) if isinstance(v, list) else v for k, v in given.items()})
+            check_limits(options)
+            values[name] = options
+        command(**values)
+
+    run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    run.__annotations__ = {p.name: p.annotation for p in parameters}
+    return run
+
+
+def _flag(item: Any, hint: Any, group: str) -> inspect.Parameter:
+    about, default = item.metadata, default_of(item)
+    names = [flag_of(item)] + ([f"-{about['short']}"] if about.get("short") else [])
+    if isinstance(default, tuple):
+        hint, default, names = list[str], list(default), [names[0].removesuffix("s"), *names[1:]]
+    if about.get("choices"):
+        hint = Literal[about["choices"]]
+    setting = typer.Option(
+        *names,
+        help=about.get("help", ""),
+        metavar=about.get("metavar"),
+        rich_help_panel=_panel(group),
+    )
+    return inspect.Parameter(
+        item.name,
+        inspect.Parameter.KEYWORD_ONLY,
+        default=default,
+        annotation=Annotated[hint, setting],
+    )
+
+
+def _panel(group: str) -> str:
+    return {"ConvertOptions": "Levels of detail", "ReadOptions": "Reading"}.get(group, group)
+
+
+def read_config(context: typer.Context, path: Path | None) -> Path | None:
+    """Callback of `--config`: the file's keys become the defaults of this command's flags.
+
+    Raises UsageError with the line of an unknown key.
+    """
+    if path is None:
+        return None
+    try:
+        text = path.read_text(encoding="utf-8")
+        values = tomllib.loads(text)
+    except OSError as error:
+        raise UsageError(f"{path}: cannot read this configuration ({error.strerror})") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise UsageError(f"{path}: expected TOML; {error}") from error
+    values = values.get(context.info_name or "", values)
+    known = {p.name for p in context.command.params if p.param_type_name == "option"} - {"config"}
+    found: dict[str, Any] = {}
+    for key, value in values.items():
+        name = key.replace("-", "_")
+        if name not in known:
+            line = next((i for i, t in enumerate(text.splitlines(), 1) if t.lstrip().startswith(key)), 0)
+            choices = ", ".join(sorted(str(k) for k in known))
+            raise UsageError(f"{path}, line {line}: no option is called {key!r}; known: {choices}")
+        found[name] = value
+    context.default_map = {**(context.default_map or {}), **found}
+    return path

@@ -1,0 +1,1 @@
+"""Measure: draws any level beside the truth and scores it. Views, pictures, contact sheets."""

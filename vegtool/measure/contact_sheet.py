@@ -1,0 +1,81 @@
+"""One picture of a chain: the original above, the levels below, where they are meant to be used.
+
+A column per level. Both pictures of a column are taken from the level's near distance and shown
+magnified (nearest texel) to the same size, so that a person can compare pixel by pixel.
+"""
+
+from __future__ import annotations
+
+from io import BytesIO
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+from vegtool.arrays import ByteArray
+from vegtool.gl.upload import PlantBuffers
+from vegtool.lod import Level, LodChain
+from vegtool.measure.pictures import client_plant, live, over, truth
+from vegtool.measure.views import Camera, direction, framed
+
+CELL = 360
+"""Pixels of a picture's side on the sheet; small pictures are magnified to fill it."""
+MARGIN, CAPTION = 12, 58
+BACKGROUND = (0.19, 0.27, 0.36)
+"""Linear: a light overcast sky, against which both light and dark leaves stand out."""
+PAPER, INK, FAINT = (250, 250, 248), (30, 34, 38), (110, 116, 122)
+VIEW = direction(25.0, 8.0)
+
+
+def contact_sheet(chain: LodChain) -> bytes:
+    """The sheet as PNG bytes."""
+    plant = chain.levels[0].mesh
+    assert plant is not None
+    levels = chain.levels[1:]
+    with PlantBuffers(plant) as original:
+        cells = []
+        for level in levels:
+            camera = framed(
+                plant.center, plant.radius, VIEW, level.near_distance_m, chain.display
+            )
+            with PlantBuffers(client_plant(level), mipmaps=True) as buffers:
+                cells.append((camera, truth(original, camera), live(buffers, camera)))
+    width = MARGIN + len(levels) * (CELL + MARGIN)
+    height = 2 * (CELL + MARGIN) + MARGIN + CAPTION + 34
+    sheet = Image.new("RGB", (width, height), PAPER)
+    pen = ImageDraw.Draw(sheet)
+    title, small = ImageFont.load_default(18), ImageFont.load_default(13)
+    heading = f"{chain.name}   {len(plant.faces):,} triangles"
+    pen.text((MARGIN, MARGIN), heading, fill=INK, font=title)
+    for column, (level, (camera, above, below)) in enumerate(zip(levels, cells, strict=True)):
+        x, y = MARGIN + column * (CELL + MARGIN), MARGIN + 34
+        for picture in (above, below):
+            sheet.paste(Image.fromarray(_magnified(over(picture, BACKGROUND))), (x, y))
+            y += CELL + MARGIN
+        for row, (text, colour) in enumerate(_caption(level, column + 1, camera)):
+            pen.text((x, y + 18 * row), text, fill=colour, font=small)
+    stream = BytesIO()
+    sheet.save(stream, "PNG", compress_level=4)
+    return stream.getvalue()
+
+
+def _magnified(picture: ByteArray) -> ByteArray:
+    """Square pictures brought to CELL: whole-number steps where small, averaged where large."""
+    side = picture.shape[0]
+    if side >= CELL:
+        image = Image.fromarray(picture).resize((CELL, CELL), Image.Resampling.BOX)
+        return np.asarray(image)
+    step = CELL // side
+    big = picture.repeat(step, axis=0).repeat(step, axis=1)
+    spare = CELL - big.shape[0]
+    edges = (spare // 2, spare - spare // 2)
+    return np.pad(big, (edges, edges, (0, 0)), mode="edge")
+
+
+def _caption(level: Level, number: int, camera: Camera) -> list[tuple[str, tuple[int, int, int]]]:
+    assert level.billboards is not None and level.atlas is not None
+    height, width = level.atlas.color.shape[:2]
+    return [
+        (f"LOD{number}, from {level.near_distance_m:.3g} m", INK),
+        (f"{len(level.billboards):,} billboards, {level.triangles:,} triangles", FAINT),
+        (f"atlas {width} x {height}", FAINT),
+    ]

@@ -1,0 +1,67 @@
+"""Pictures of plants and levels: the truth, and what a client shows live."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from vegtool.arrays import ByteArray
+from vegtool.gl.draw import MSAA, Light, draw
+from vegtool.gl.upload import PlantBuffers
+from vegtool.lod import Level, billboard_quads
+from vegtool.measure.views import Camera
+from vegtool.plant import Material, Plant, Texture
+
+TRUTH_SUPERSAMPLE = 4
+"""Per axis, for pictures that are looked at; scores ask for more."""
+
+
+def client_plant(level: Level, name: str = "level") -> Plant:
+    """A level as the mesh that a client gets from its file, so that one path draws everything."""
+    if level.mesh is not None:
+        return level.mesh
+    assert level.atlas is not None
+    quads = billboard_quads(level)
+    opaque = np.full(level.atlas.normal.shape[:2] + (1,), 255, np.uint8)
+    material = Material(
+        name,
+        color_texture=Texture("color", level.atlas.color),
+        normal_texture=Texture("normal", np.concatenate([level.atlas.normal, opaque], axis=2)),
+        alpha_mode="mask",
+        double_sided=level.double_sided,
+    )
+    faces = quads.indices.reshape(-1, 3)
+    nothing = np.zeros(len(faces), np.int32)
+    return Plant(name, quads.positions, quads.normals, quads.uvs, faces, nothing, (material,))
+
+
+def truth(
+    buffers: PlantBuffers,
+    camera: Camera,
+    light: Light | None = None,
+    supersample: int = TRUTH_SUPERSAMPLE,
+) -> npt.NDArray[np.float32]:
+    """The original as it is: alpha tested per sample, no mips. buffers: without mipmaps."""
+    size = camera.width, camera.height
+    return draw(buffers, camera.view_projection(), size, camera.target, light, supersample)
+
+
+def live(
+    buffers: PlantBuffers, camera: Camera, light: Light | None = None
+) -> npt.NDArray[np.float32]:
+    """What a client shows: mip-mapped textures, alpha tested once per pixel, 4x multisampling."""
+    size = camera.width, camera.height
+    return draw(buffers, camera.view_projection(), size, camera.target, light, 1, MSAA)
+
+
+def over(picture: npt.NDArray[np.float32], background: npt.ArrayLike) -> ByteArray:
+    """A linear premultiplied picture (h, w, 4) over a linear colour (3,): sRGB bytes (h, w, 3)."""
+    linear = picture[..., :3] + (1 - picture[..., 3:]) * np.asarray(background, np.float32)
+    return np.asarray((srgb(np.clip(linear, 0, 1)) * 255 + 0.5).astype(np.uint8))
+
+
+def srgb(linear: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """Linear light to sRGB, both 0 to 1 (IEC 61966-2-1)."""
+    low = linear * 12.92
+    high = 1.055 * np.maximum(linear, 1e-8) ** (1 / 2.4) - 0.055
+    return np.where(linear <= 0.0031308, low, high)
