@@ -1,0 +1,87 @@
+"""Branches from bare geometry: triangle order, connectivity, texture seams and materials.
+
+Colditz et al. 2005, "Real-time Rendering of Complex Photorealistic Landscapes Using Hybrid
+Level-of-Detail Approaches", section 2, take the branches from the file's order and tell wood from
+leaves by texture. Few files keep that order, so here geometry speaks first: wood falls into parts
+(parts.py), parts into rings (skeleton.py), rings into tubes (tubes.py); tubes grow from tubes
+(join.py) and carry leaves (leaves.py). Nothing depends on place, size or direction of the plant.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vegtool.arrays import FloatArray
+from vegtool.branches.axes import axes_of
+from vegtool.branches.join import join_tubes
+from vegtool.branches.leaves import hang_leaves
+from vegtool.branches.parts import Parts, connected_parts
+from vegtool.branches.skeleton import skeleton
+from vegtool.branches.tubes import cut_tubes
+from vegtool.plant import Branches, Plant
+from vegtool.progress import Progress, silent
+
+
+def branches_of(plant: Plant, progress: Progress = silent) -> Branches:
+    """What the file declares of its branches, else what can be recovered."""
+    return plant.branches or recover_branches(plant, progress)
+
+
+def recover_branches(plant: Plant, progress: Progress = silent) -> Branches:
+    """The branches of a plant from its geometry alone; what the file declares is not looked at.
+
+    Works on every plant: one without wood has a bare trunk and a branch for each connected part.
+    """
+    positions = _unit_positions(plant)
+    leaf = plant.face_is_leaf
+    progress("branches", 0.0)
+    if leaf.all():
+        return _without_wood(connected_parts(positions, plant.faces.astype(np.int64)))
+    wood = connected_parts(positions, plant.faces[~leaf].astype(np.int64))
+    rings = skeleton(wood)
+    tubes = cut_tubes(rings)
+    axes = axes_of(rings, tubes)
+    progress("branches", 0.3)
+    parent = join_tubes(rings, tubes, axes)
+    progress("branches", 0.5)
+    face_tube = np.empty(len(leaf), dtype=np.int64)
+    ring = rings.vertex_ring[wood.faces]
+    outermost = rings.hop[ring].argmax(axis=1)
+    face_tube[~leaf] = tubes.ring_tube[ring[np.arange(len(ring)), outermost]]
+    if leaf.any():
+        leaves = connected_parts(positions, plant.faces[leaf].astype(np.int64))
+        face_tube[leaf] = hang_leaves(leaves, axes)
+    progress("branches", 1.0)
+    return _branches(face_tube, parent)
+
+
+def _unit_positions(plant: Plant) -> FloatArray:
+    """Positions about the middle of the bounds, scaled so that the bounds' half diagonal is 1."""
+    low, high = plant.bounds
+    half = (high - low) / 2
+    size = np.linalg.norm(half / max(half.max(), np.finfo(float).tiny)) * half.max()
+    centred = plant.positions - (low + half)
+    return np.asarray(np.clip(centred / max(size, np.finfo(float).tiny), -1, 1))
+
+
+def _branches(face_tube: np.ndarray, parent: np.ndarray) -> Branches:
+    """Branches ordered by level, then as the file first shows them."""
+    level = np.zeros(len(parent), dtype=np.int64)
+    ancestor = parent.copy()
+    while (ancestor >= 0).any():
+        level += ancestor >= 0
+        ancestor = np.where(ancestor >= 0, parent[ancestor], -1)
+    order = np.lexsort((np.arange(len(parent)), level))
+    rank = np.empty(len(parent), dtype=np.int32)
+    rank[order] = np.arange(len(parent))
+    new_parent = np.where(parent[order] >= 0, rank[parent[order]], -1)
+    return Branches(rank[face_tube], new_parent, level[order], "recovered")
+
+
+def _without_wood(parts: Parts) -> Branches:
+    """A trunk that nobody sees and, where the leaves fall apart, a branch for each part."""
+    count = parts.count
+    if count == 1:
+        return Branches(parts.face_part, [-1], [0], "recovered")
+    parent = np.concatenate([[-1], np.zeros(count, dtype=np.int64)])
+    return Branches(parts.face_part + 1, parent, parent + 1, "recovered")

@@ -1,0 +1,74 @@
+"""Tubes: chains of rings. Where the rings of one part fork, the heavier arm goes on.
+
+A spur shorter than the wood there is thick is no branch but a bump, and stays with its tube.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vegtool.arrays import FloatArray
+from vegtool.branches.skeleton import Skeleton
+
+SPUR = 2.0  # radii: a side arm shorter than this belongs to the tube it stands on
+
+
+@dataclass(frozen=True, eq=False)
+class Tubes:
+    """Chains of rings, t of them, ordered as the file first shows them.
+
+    ring_tube: (r,). start: (t,) first ring. fork: (t,) the ring of the same part that the tube
+    forks from, or -1 where it starts a part of its own. length: (t,) from start to its far end.
+    along: (r,) from the tube's start to the ring.
+    """
+
+    ring_tube: np.ndarray
+    start: np.ndarray
+    fork: np.ndarray
+    length: FloatArray
+    along: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+
+def cut_tubes(rings: Skeleton) -> Tubes:
+    """The tubes of a skeleton."""
+    count = len(rings.parent)
+    has_parent = rings.parent >= 0
+    up = np.where(has_parent, rings.parent, np.arange(count))
+    step = np.linalg.norm(rings.center - rings.center[up], axis=1)
+    by_hop = np.argsort(rings.hop, kind="stable")
+    bounds = np.searchsorted(rings.hop[by_hop], np.arange(rings.hop.max() + 2))
+    layers = [by_hop[bounds[i] : bounds[i + 1]] for i in range(len(bounds) - 1)]
+
+    # from the tips to the starts: the longest way to a tip, and the wood that hangs on a ring
+    reach = np.zeros(count)
+    mass = step * np.maximum(rings.radius, rings.radius[up]) + np.finfo(float).eps
+    for layer in reversed(layers[1:]):
+        rows = layer[has_parent[layer]]
+        np.maximum.at(reach, up[rows], reach[rows] + step[rows])
+        np.add.at(mass, up[rows], mass[rows])
+
+    rows = np.flatnonzero(has_parent)
+    order = rows[np.lexsort((-rows, mass[rows], up[rows]))]
+    heaviest = np.full(count, -1)
+    heaviest[up[order]] = order  # the last one written, the heaviest
+    stays = has_parent & (heaviest[up] == np.arange(count))
+    stays |= has_parent & (reach + step < SPUR * rings.radius[up])
+
+    head = np.where(stays, up, np.arange(count))
+    along = np.zeros(count)
+    for layer in layers[1:]:
+        head[layer] = head[head[layer]]
+        along[layer] = np.where(stays[layer], along[up[layer]] + step[layer], 0.0)
+    start, ring_tube = np.unique(head, return_inverse=True)
+    first_vertex = np.full(count, len(rings.vertex_ring))
+    np.minimum.at(first_vertex, rings.vertex_ring, np.arange(len(rings.vertex_ring)))
+    shown = np.lexsort((first_vertex[start], rings.part[start]))
+    rank = np.empty(len(start), dtype=np.int64)
+    rank[shown] = np.arange(len(start))
+    start = start[shown]
+    return Tubes(rank[ring_tube], start, rings.parent[start], reach[start], along)
