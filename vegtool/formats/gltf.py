@@ -1,0 +1,322 @@
+"""Writing glTF 2.0: a plant, one level, or a whole chain of levels as .glb files.
+
+Sources: glTF 2.0 specification; MSFT_lod (vendor extension, Khronos glTF repository).
+
+A file holds positions as float32, so a plant far from its origin (map coordinates) would lose
+what its leaves are made of. Its vertices are then written relative to the plant's centre, and the
+node's translation carries the offset.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from vegtool.arrays import FloatArray, IntArray, unit
+from vegtool.formats import png
+from vegtool.formats.atomic import FileSet
+from vegtool.formats.glb import ELEMENT_ARRAY_BUFFER, Document
+from vegtool.formats.manifest import LevelFile, encode, manifest, screen_height_fraction
+from vegtool.formats.tangents import tangents
+from vegtool.lod import Level, LodChain, billboard_quads
+from vegtool.plant import Material, Plant, Texture
+
+ALPHA_CUTOFF = 0.5  # of a billboard: alpha is coverage, half covered is drawn
+ROUGHNESS = 0.9  # of a billboard: foliage seen from afar has no highlight of its own
+FAR_FROM_ORIGIN = 16.0  # plant radii: float32 rounds by 2^-24 of it, a millionth of a radius
+
+_SHORT_INDICES = 65535  # vertices; index 65535 itself is reserved for primitive restart
+_LINEAR, _LINEAR_MIPMAP_LINEAR = 9729, 9987
+_REPEAT, _CLAMP_TO_EDGE = 10497, 33071
+
+EncodedImages = dict[int, tuple[bytes, str]]
+"""File bytes and MIME type of images already encoded, by the id of their texture or pixels."""
+
+
+def plant_glb(plant: Plant) -> bytes:
+    """A plant as a .glb file: one node, one mesh, one primitive per material that has faces."""
+    writer = _Writer(_local_origin(plant.bounds), {})
+    writer.document.show(writer.add_plant(plant, plant.name))
+    return writer.document.glb()
+
+
+def level_glb(level: Level, name: str, images: EncodedImages | None = None) -> bytes:
+    """One level as a .glb file whose node is called `name`.
+
+    Billboards are one mesh with one primitive and one material, alpha-tested. `images` carries
+    encoded images from one call to the next for the same chain.
+    """
+    writer = _Writer(_local_origin(_bounds(level)), {} if images is None else images)
+    writer.document.show(writer.add_level(level, name))
+    return writer.document.glb()
+
+
+def chain_glb(chain: LodChain, images: EncodedImages | None = None) -> bytes:
+    """All levels as one .glb file, tied together by MSFT_lod.
+
+    The scene holds the finest level alone, so a client that does not know the extension shows
+    that one. `extras.MSFT_screencoverage` holds for each level the least share of the image's
+    height at which it is drawn (the metric that Unity's importer expects).
+    """
+    bounds = [_bounds(level) for level in chain.levels]
+    origin = _local_origin(np.stack([np.min(bounds, (0, 1)), np.max(bounds, (0, 1))]))
+    writer = _Writer(origin, {} if images is None else images)
+    names = [level_name(chain, index) for index in range(len(chain.levels))]
+    nodes = [writer.add_level(*pair) for pair in zip(chain.levels, names, strict=True)]
+    if len(nodes) > 1:
+        writer.document.use_extension("MSFT_lod")
+        writer.document.change(
+            "nodes",
+            nodes[0],
+            extensions={"MSFT_lod": {"ids": nodes[1:]}},
+            extras={"MSFT_screencoverage": screen_coverage(chain)},
+        )
+    writer.document.show(nodes[0])
+    return writer.document.glb()
+
+
+def write_chain(
+    chain: LodChain,
+    folder: Path,
+    force: bool = False,
+    depth: bool = False,
+    extra: Mapping[str, bytes] | None = None,
+    inputs: Iterable[Path] = (),
+) -> list[Path]:
+    """Write NAME_LOD1.glb, ..., NAME.glb (all levels), NAME.lod.json and `extra`: all or none.
+
+    depth: also NAME_LOD1_depth.png, ...: 16 bit grey, as Atlas.depth.
+    extra: bytes of further files by name, which appear with the others.
+    inputs: files that the chain was made from; nothing in their folders is overwritten.
+    Returns the paths of the files. Raises OutputError as FileSet does.
+    """
+    images: EncodedImages = {}
+    with FileSet(folder, force, inputs) as files:
+        levels: list[LevelFile] = []
+        for index, level in enumerate(chain.levels[1:], start=1):
+            name = level_name(chain, index)
+            data = level_glb(level, name, images)
+            files.add(f"{name}.glb", data)
+            depth_name = None
+            if depth and level.atlas is not None:
+                depth_name = f"{name}_depth.png"
+                files.add(depth_name, png.encode(level.atlas.depth))
+            levels.append(LevelFile(f"{name}.glb", len(data), depth_name))
+        data = chain_glb(chain, images)
+        combined = LevelFile(f"{chain.name}.glb", len(data))
+        files.add(combined.name, data)
+        for name, data in (extra or {}).items():
+            files.add(name, data)
+        text = encode(manifest(chain, [combined, *levels]))
+        files.add(f"{chain.name}.lod.json", text)
+        return files.paths
+
+
+def file_names(name: str, levels: int, depth: bool = False) -> list[str]:
+    """The files that `write_chain` writes for a chain of that many levels, the original counted."""
+    lower = [f"{name}_LOD{index}" for index in range(1, levels)]
+    depths = [f"{each}_depth.png" for each in lower] if depth else []
+    return [*(f"{each}.glb" for each in lower), *depths, f"{name}.glb", f"{name}.lod.json"]
+
+
+def level_name(chain: LodChain, index: int) -> str:
+    """NAME_LOD0, NAME_LOD1, ...: of a level's node and, with .glb, of its file."""
+    return f"{chain.name}_LOD{index}"
+
+
+def screen_coverage(chain: LodChain) -> list[float]:
+    """For each level the least share of the image's height that the plant has while it is drawn.
+
+    Strictly decreasing, at most 1. A level gives way where the next one may be used; the last is
+    drawn until the plant is one pixel high.
+    """
+    shares = [screen_height_fraction(chain, level.near_distance_m) for level in chain.levels[1:]]
+    coverage: list[float] = []
+    limit = 1.0
+    for share in [*shares, 1.0 / chain.display.image_height_px]:
+        coverage.append(min(share, limit))
+        limit = 0.99 * coverage[-1]
+    return coverage
+
+
+class _Writer:
+    """Puts levels into one document, relative to one origin; each image goes in once."""
+
+    def __init__(self, origin: FloatArray, images: EncodedImages) -> None:
+        self.document = Document()
+        self._origin = origin
+        self._images = images
+        self._textures: dict[int, int] = {}
+        self._samplers: dict[int, int] = {}
+
+    def add_level(self, level: Level, name: str) -> int:
+        """Add a level of any kind; return its node."""
+        if level.kind == "mesh":
+            assert level.mesh is not None
+            return self.add_plant(level.mesh, name)
+        return self.add_billboards(level, name)
+
+    def add_plant(self, plant: Plant, name: str) -> int:
+        """Add a plant; return its node."""
+        used = np.unique(plant.face_material).tolist()
+        return self._add_node(name, [self._add_part(plant, index) for index in used])
+
+    def add_billboards(self, level: Level, name: str) -> int:
+        """Add a billboard level; return its node."""
+        quads = billboard_quads(level)
+        attributes = {
+            "POSITION": self._add_positions(quads.positions),
+            "NORMAL": self._add_floats(quads.normals),
+            "TANGENT": self._add_floats(quads.tangents),
+            "TEXCOORD_0": self._add_floats(quads.uvs),
+        }
+        primitive = {
+            "attributes": attributes,
+            "indices": self._add_indices(quads.indices, len(quads.positions)),
+            "material": self._add_atlas_material(level, name),
+        }
+        return self._add_node(name, [primitive])
+
+    def _add_node(self, name: str, primitives: list[dict[str, Any]]) -> int:
+        mesh = self.document.add("meshes", name=name, primitives=primitives)
+        moved = {"translation": self._origin.tolist()} if self._origin.any() else {}
+        return self.document.add("nodes", name=name, mesh=mesh, **moved)
+
+    def _add_part(self, plant: Plant, index: int) -> dict[str, Any]:
+        """The faces of one material as a primitive with vertices of its own."""
+        material = plant.materials[index]
+        vertices, faces = _compact(plant.faces[plant.face_material == index], len(plant.positions))
+        positions, normals = plant.positions[vertices], _unit_normals(plant.normals[vertices])
+        frames = None
+        if material.normal_texture is not None:
+            frames, origin, faces = tangents(positions, normals, plant.uvs[vertices], faces)
+            positions, normals, vertices = positions[origin], normals[origin], vertices[origin]
+        attributes = {
+            "POSITION": self._add_positions(positions),
+            "NORMAL": self._add_floats(normals),
+        }
+        if frames is not None:
+            attributes["TANGENT"] = self._add_floats(frames)
+        if plant.uvs.any():
+            attributes["TEXCOORD_0"] = self._add_floats(plant.uvs[vertices])
+        if plant.colors is not None:
+            share = np.clip(plant.colors[vertices], 0.0, 1.0)
+            colors = np.round(share * 65535).astype(np.uint16)
+            attributes["COLOR_0"] = self.document.add_accessor(colors, normalized=True)
+        return {
+            "attributes": attributes,
+            "indices": self._add_indices(faces.ravel(), len(positions)),
+            "material": self._add_material(material),
+        }
+
+    def _add_positions(self, positions: FloatArray) -> int:
+        local = (positions - self._origin).astype(np.float32)
+        return self.document.add_accessor(local, bounds=True)
+
+    def _add_floats(self, values: FloatArray) -> int:
+        return self.document.add_accessor(values.astype(np.float32))
+
+    def _add_indices(self, indices: IntArray, vertices: int) -> int:
+        dtype = np.uint16 if vertices <= _SHORT_INDICES else np.uint32
+        return self.document.add_accessor(indices.astype(dtype), ELEMENT_ARRAY_BUFFER)
+
+    def _add_material(self, material: Material) -> int:
+        surface: dict[str, Any] = {
+            "baseColorFactor": np.clip(material.base_color, 0.0, 1.0).tolist(),
+            "metallicFactor": min(max(material.metallic, 0.0), 1.0),
+            "roughnessFactor": min(max(material.roughness, 0.0), 1.0),
+        }
+        properties: dict[str, Any] = {"name": material.name, "pbrMetallicRoughness": surface}
+        if material.color_texture is not None:
+            surface["baseColorTexture"] = {"index": self._add_texture(material.color_texture)}
+        if material.normal_texture is not None:
+            index = self._add_texture(material.normal_texture)
+            properties["normalTexture"] = {"index": index, "scale": material.normal_scale}
+        if material.alpha_mode == "mask":
+            properties |= {"alphaMode": "MASK", "alphaCutoff": material.alpha_cutoff}
+        return self.document.add("materials", **properties, doubleSided=material.double_sided)
+
+    def _add_atlas_material(self, level: Level, name: str) -> int:
+        atlas = level.atlas
+        assert atlas is not None
+        color = self._add_pixels(atlas.color, f"{name}_color")
+        normal = self._add_pixels(atlas.normal, f"{name}_normal")
+        return self.document.add(
+            "materials",
+            name=name,
+            pbrMetallicRoughness={
+                "baseColorTexture": {"index": color},
+                "metallicFactor": 0.0,
+                "roughnessFactor": ROUGHNESS,
+            },
+            normalTexture={"index": normal},
+            alphaMode="MASK",
+            alphaCutoff=ALPHA_CUTOFF,
+            doubleSided=level.double_sided,
+        )
+
+    def _add_texture(self, texture: Texture) -> int:
+        if id(texture) not in self._images:
+            self._images[id(texture)] = png.encode_texture(texture)
+        return self._add_image(id(texture), texture.name, _REPEAT)
+
+    def _add_pixels(self, pixels: npt.NDArray[np.uint8], name: str) -> int:
+        if id(pixels) not in self._images:
+            self._images[id(pixels)] = (png.encode(pixels), "image/png")
+        return self._add_image(id(pixels), name, _CLAMP_TO_EDGE)
+
+    def _add_image(self, key: int, name: str, wrap: int) -> int:
+        """A texture that shows the encoded image `key`; the same one for the same key."""
+        if key not in self._textures:
+            data, mime_type = self._images[key]
+            view = self.document.add_view(data)
+            source = self.document.add("images", name=name, mimeType=mime_type, bufferView=view)
+            sampler = self._add_sampler(wrap)
+            self._textures[key] = self.document.add("textures", source=source, sampler=sampler)
+        return self._textures[key]
+
+    def _add_sampler(self, wrap: int) -> int:
+        if wrap not in self._samplers:
+            self._samplers[wrap] = self.document.add(
+                "samplers",
+                magFilter=_LINEAR,
+                minFilter=_LINEAR_MIPMAP_LINEAR,
+                wrapS=wrap,
+                wrapT=wrap,
+            )
+        return self._samplers[wrap]
+
+
+def _bounds(level: Level) -> FloatArray:
+    """(2, 3) metres: least and greatest corner of what the level draws."""
+    if level.mesh is not None and level.kind == "mesh":
+        return level.mesh.bounds
+    positions = billboard_quads(level).positions
+    return np.stack([positions.min(axis=0), positions.max(axis=0)])
+
+
+def _local_origin(bounds: FloatArray) -> FloatArray:
+    """(3,) metres, exact in float32: zero, or the centre of bounds that lie far from zero."""
+    radius = 0.5 * np.linalg.norm(bounds[1] - bounds[0])
+    if np.abs(bounds).max() <= FAR_FROM_ORIGIN * radius:
+        return np.zeros(3)
+    return np.asarray(bounds.mean(axis=0).astype(np.float32).astype(np.float64))
+
+
+def _compact(faces: IntArray, count: int) -> tuple[IntArray, IntArray]:
+    """The vertices of 0..count-1 that `faces` use, in order, and the faces renumbered to them."""
+    used = np.zeros(count, dtype=bool)
+    used[faces] = True
+    renumbered = np.cumsum(used, dtype=np.int32) - 1
+    return np.flatnonzero(used).astype(np.int32), renumbered[faces].astype(np.int32)
+
+
+def _unit_normals(normals: FloatArray) -> FloatArray:
+    """Unit vectors; straight up where there is no direction, since glTF allows no zero normal."""
+    result = unit(normals)
+    result[~result.any(axis=1)] = (0.0, 1.0, 0.0)
+    return result

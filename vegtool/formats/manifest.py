@@ -1,0 +1,177 @@
+"""The manifest NAME.lod.json: which file to draw from which distance, and how wrong it is.
+
+Its keys are described in manifest.schema.json, beside this file, and in docs/manifest.md.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from math import radians, tan
+from pathlib import Path
+from typing import Any
+
+import vegtool
+from vegtool.errors import InputError
+from vegtool.lod import Level, LodChain
+
+VERSION = 1  # of the schema: one more when a reader of the last one would misread the file
+FADE_FRACTION = (
+    0.15  # of the switch distance: a crossfade starts that much before it and ends there
+)
+
+_AGAIN = "Convert the plant again."
+_TYPES: dict[str, tuple[type, ...]] = {
+    "object": (dict,),
+    "array": (list,),
+    "string": (str,),
+    "number": (int, float),
+    "integer": (int,),
+    "boolean": (),
+    "null": (type(None),),
+}
+
+
+@dataclass(frozen=True)
+class LevelFile:
+    """What was written for a level: file name and size in bytes, and its depth image's name."""
+
+    name: str
+    bytes: int
+    depth: str | None = None
+
+
+def manifest(chain: LodChain, files: Sequence[LevelFile]) -> dict[str, Any]:
+    """The manifest of a chain whose levels were written to `files`, one for each level, in order.
+
+    The first is the combined file, which shows the original wherever MSFT_lod is not read.
+    Distances are for `chain.display`; measured errors are null until they are measured. The same
+    chain gives the same manifest: no time, no path.
+    """
+    if len(files) != len(chain.levels):
+        raise ValueError(f"manifest: {len(chain.levels)} levels need as many files: {len(files)}")
+    return {
+        "version": VERSION,
+        "tool_version": vegtool.__version__,
+        "name": chain.name,
+        "seed": chain.seed,
+        "fov_y_deg": chain.display.fov_y_deg,
+        "image_height_px": chain.display.image_height_px,
+        "extent_m": extent(chain),
+        "options": chain.options,
+        "combined": {"file": files[0].name, "bytes": files[0].bytes},
+        "levels": [
+            _level(chain, level, file) for level, file in zip(chain.levels, files, strict=True)
+        ],
+    }
+
+
+def _level(chain: LodChain, level: Level, file: LevelFile) -> dict[str, Any]:
+    distance = level.near_distance_m
+    error = level.geometric_error_m
+    return {
+        "file": file.name,
+        "kind": level.kind,
+        "triangles": level.triangles,
+        "billboards": 0 if level.billboards is None else len(level.billboards),
+        "texels": level.texels,
+        "bytes": file.bytes,
+        "switch_distance_m": distance,
+        "fade_start_m": (1 - FADE_FRACTION) * distance,
+        "fade_end_m": distance,
+        "screen_height_fraction": screen_height_fraction(chain, distance) if distance else None,
+        "geometric_error_m": None if error is None else {"max": error[0], "p95": error[1]},
+        "measured": None,
+        **({"depth": file.depth} if file.depth else {}),
+    }
+
+
+def extent(chain: LodChain) -> float:
+    """Metres: the plant's largest extent along an axis, which for a tree is its height."""
+    original = chain.levels[0].mesh
+    if original is None:
+        raise ValueError("LodChain: level 0 must be a mesh")
+    return float((original.bounds[1] - original.bounds[0]).max())
+
+
+def screen_height_fraction(chain: LodChain, distance_m: float) -> float:
+    """Share of the image's height that the plant's largest extent covers from that distance."""
+    return extent(chain) / (2 * tan(radians(chain.display.fov_y_deg) / 2) * distance_m)
+
+
+def encode(values: dict[str, Any]) -> bytes:
+    """A manifest as the bytes of its file."""
+    return (json.dumps(values, indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
+
+
+def read_manifest(path: Path) -> dict[str, Any]:
+    """Read NAME.lod.json.
+
+    Raises InputError where the file is missing, is no JSON, has another version than this
+    vegtool reads, or lacks a key that it needs.
+    """
+    try:
+        values = json.loads(path.read_bytes())
+    except OSError as error:
+        raise InputError(
+            f"{path}: cannot be read ({error.strerror}); expected a manifest, NAME.lod.json, as "
+            "vegtool convert writes it."
+        ) from error
+    except ValueError as error:
+        raise InputError(
+            f"{path}: expected a manifest, found no JSON ({error}). {_AGAIN}"
+        ) from error
+    version = values.get("version") if isinstance(values, dict) else None
+    if version != VERSION:
+        found = "none" if version is None else f"version {version!r}"
+        raise InputError(
+            f"{path}: expected a manifest of version {VERSION}, found {found}. {_AGAIN}"
+        )
+    fault = _fault(values, schema(), "")
+    if fault:
+        raise InputError(f"{path}: {fault}. {_AGAIN}")
+    result: dict[str, Any] = values
+    return result
+
+
+def _fault(value: Any, rule: dict[str, Any], where: str) -> str:
+    """The first way in which `value` breaks `rule`, or nothing.
+
+    Knows the words of the schema that a reader's code relies on: type, required, properties,
+    items and minItems. (The tests check whole manifests with a complete validator.)
+    """
+    types = rule.get("type", [])
+    types = [types] if isinstance(types, str) else types
+    if types and not any(_is(value, name) for name in types):
+        return f"{where or 'the manifest'}: expected {' or '.join(types)}, found {value!r:.40}"
+    if isinstance(value, dict):
+        for key in rule.get("required", []):
+            if key not in value:
+                return f"{where or 'the manifest'}: lacks the key {key!r}"
+        parts = [(k, value[k], r) for k, r in rule.get("properties", {}).items() if k in value]
+    elif isinstance(value, list):
+        if len(value) < rule.get("minItems", 0):
+            return f"{where}: expected at least {rule['minItems']}, found {len(value)}"
+        parts = [(str(i), item, rule.get("items", {})) for i, item in enumerate(value)]
+    else:
+        return ""
+    faults = (_fault(part, r, f"{where}.{key}".lstrip(".")) for key, part, r in parts)
+    return next(filter(None, faults), "")
+
+
+def _is(value: Any, name: str) -> bool:
+    """Whether a JSON value has the type that JSON Schema calls `name`."""
+    if isinstance(value, bool):
+        return name == "boolean"
+    return isinstance(value, _TYPES[name])
+
+
+@cache
+def schema() -> dict[str, Any]:
+    """The JSON schema (draft 2020-12) of a manifest."""
+    text = resources.files("vegtool.formats").joinpath("manifest.schema.json").read_text("utf-8")
+    result: dict[str, Any] = json.loads(text)
+    return result
