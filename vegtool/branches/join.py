@@ -1,8 +1,10 @@
 """Joins every tube to the tube that it grows from: the nearest thicker one.
 
-Nearest is by the gap between the start of the axis and the other's surface, in start radii;
-inside another tube, where the gap is nought, by how deep: generators start a branch on its
-parent's axis. A tube that starts far from all wood, or beside another's foot, is a trunk.
+Nearest is by the gap between the start of the axis and the other's surface, in start radii; inside
+another tube, where the gap is nought, by how deep: generators start a branch on its parent's axis.
+Being thicker only weighs in, for generators do make branches thicker than their parents. The
+cheapest joins are made first and none may close a circle. A tube that starts far from all wood, or
+at another's foot, is a trunk.
 """
 
 from __future__ import annotations
@@ -15,41 +17,22 @@ from vegtool.branches.skeleton import Skeleton
 from vegtool.branches.tubes import Tubes
 
 NEIGHBOURS = 24  # samples looked at in each class of thickness
-THINNER = 0.8  # a parent is at least so thick where the branch begins, in the branch's radii
+HOSTS = 8  # of which so many tubes are kept
 REACH = 3.0  # start radii: wider gaps are bridged only within REACH_FRACTION
 REACH_FRACTION = 0.05  # of the plant's radius
+THIN = 0.25  # what a host counts that is thinner than the branch by all of its radius
+FOOT = 1e-6  # of the plant's radius: a start no farther along another tube is at its foot
 
 
 def join_tubes(rings: Skeleton, tubes: Tubes, axes: Axes) -> np.ndarray:
-    """(t,) parent tube of each tube, -1 for trunks. Never a cycle: parents rank before children
-    by thickness at the start."""
+    """(t,) parent tube of each tube, -1 for trunks, without cycles."""
     parent = np.where(tubes.fork >= 0, tubes.ring_tube[tubes.fork], -1)
     orphans = np.flatnonzero(tubes.fork < 0)
     if len(orphans) < 2:
         return parent
+    child, host, cost = _offers(rings, tubes, axes, orphans)
     root = root_tubes(parent)
-    rank = np.empty(len(tubes), dtype=np.int64)
-    thickness = rings.radius[tubes.start]
-    rank[np.lexsort((np.arange(len(tubes)), -tubes.length, -thickness))] = np.arange(len(tubes))
-    start = rings.center[tubes.start[orphans]]
-    radius = np.maximum(thickness[orphans], np.finfo(float).eps)
-
-    segment = _near_segments(start, axes)
-    distance, there, along = axes.measure(start, segment)
-    host = axes.tube[segment]
-    allowed = rank[root[host]] < rank[orphans, None]
-    gap = np.maximum(distance - there, 0)
-    depth = np.minimum(distance / np.maximum(there, np.finfo(float).eps), 1)
-    thin = np.maximum(THINNER - there / radius[:, None], 0)
-    foot = (along <= 0) & (tubes.fork[host] < 0) & (distance > there)
-    allowed &= ~foot
-    allowed &= gap <= np.maximum(REACH * radius, REACH_FRACTION)[:, None]
-    cost = np.where(allowed, gap / radius[:, None] + depth + thin, np.inf)
-    best = cost.argmin(axis=1)
-    row = np.arange(len(orphans))
-    found = np.isfinite(cost[row, best])
-    parent[orphans[found]] = host[row, best][found]
-    return parent
+    return _cheapest_forest(parent, root, child, host, cost)
 
 
 def root_tubes(parent: np.ndarray) -> np.ndarray:
@@ -60,6 +43,39 @@ def root_tubes(parent: np.ndarray) -> np.ndarray:
         if np.array_equal(further, root):
             return np.asarray(root)
         root = further
+
+
+def _offers(
+    rings: Skeleton, tubes: Tubes, axes: Axes, orphans: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, FloatArray]:
+    """Possible joins, three arrays (o,): child, host and cost; at most HOSTS for each child."""
+    start = rings.center[tubes.start[orphans]]
+    radius = np.maximum(rings.radius[tubes.start[orphans]], np.finfo(float).eps)[:, None]
+    segment = _near_segments(start, axes)
+    distance, thickness, along = axes.measure(start, segment)
+    host = axes.tube[segment]
+    gap = np.maximum(distance - thickness, 0)
+    depth = np.minimum(distance / np.maximum(thickness, np.finfo(float).eps), 1)
+    thin = THIN * np.maximum(1 - thickness / radius, 0)
+    foot = (along <= FOOT) & (tubes.fork[host] < 0)
+    allowed = ~foot & (gap <= np.maximum(REACH * radius, REACH_FRACTION))
+    row, column = np.nonzero(allowed)
+    child, host = orphans[row], host[row, column]
+    cost = (gap / radius + depth + thin)[row, column]
+
+    order = np.lexsort((cost, host, child))  # the cheapest of each pair
+    order = order[_firsts(child[order] * len(tubes) + host[order])]
+    order = order[np.lexsort((host[order], cost[order], child[order]))]
+    first = _firsts(child[order])
+    place = np.arange(len(order))
+    nth = place - np.repeat(place[first], np.diff(np.append(place[first], len(order))))
+    order = order[nth < HOSTS]
+    return child[order], host[order], cost[order]
+
+
+def _firsts(labels: np.ndarray) -> np.ndarray:
+    """(n,) bool: where a run of equal labels begins."""
+    return np.append(np.ones(min(len(labels), 1), dtype=bool), labels[1:] != labels[:-1])
 
 
 def _near_segments(points: FloatArray, axes: Axes) -> np.ndarray:
@@ -75,3 +91,24 @@ def _near_segments(points: FloatArray, axes: Axes) -> np.ndarray:
         near = tree_of(samples[rows]).query(points, k=k)[1].reshape(len(points), k)
         found.append(segment[rows[near]])
     return np.concatenate(found, axis=1)
+
+
+def _cheapest_forest(
+    parent: np.ndarray, root: np.ndarray, child: np.ndarray, host: np.ndarray, cost: FloatArray
+) -> np.ndarray:
+    """Parents after the joins, cheapest first, of which none closes a circle."""
+    above = root.tolist()  # of each tube some tube above it, finally its root
+
+    def top(tube: int) -> int:
+        while above[tube] != tube:
+            above[tube] = above[above[tube]]
+            tube = above[tube]
+        return tube
+
+    joined = parent.copy()
+    order = np.lexsort((host, child, cost))
+    for a, b in zip(child[order].tolist(), host[order].tolist(), strict=True):
+        if joined[a] < 0 and top(b) != a:
+            joined[a] = b
+            above[a] = b
+    return joined

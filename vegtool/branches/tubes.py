@@ -1,6 +1,9 @@
 """Tubes: chains of rings. Where the rings of one part fork, the heavier arm goes on.
 
 A spur shorter than the wood there is thick is no branch but a bump, and stays with its tube.
+Two tubes may also meet end to end and share a ring, as where a generator ends a trunk in a branch
+of its own: both are swept with steps and taper of their own, so a joint shows as a ring where one
+even run ends and another begins.
 """
 
 from __future__ import annotations
@@ -13,6 +16,8 @@ from vegtool.arrays import FloatArray
 from vegtool.branches.skeleton import Skeleton
 
 SPUR = 2.0  # radii: a side arm shorter than this belongs to the tube it stands on
+EVEN = 0.01  # steps of one sweep are equal to within this fraction, tapers to this slope
+JUMP = 0.05  # and those of two differ by more
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +62,7 @@ def cut_tubes(rings: Skeleton) -> Tubes:
     heaviest = np.full(count, -1)
     heaviest[up[order]] = order  # the last one written, the heaviest
     stays = has_parent & (heaviest[up] == np.arange(count))
+    stays &= ~_joints(rings, np.where(stays, up, -1), step)
     stays |= has_parent & (reach + step < SPUR * rings.radius[up])
 
     head = np.where(stays, up, np.arange(count))
@@ -72,3 +78,30 @@ def cut_tubes(rings: Skeleton) -> Tubes:
     rank[shown] = np.arange(len(start))
     start = start[shown]
     return Tubes(rank[ring_tube], start, rings.parent[start], reach[start], along)
+
+
+def _joints(rings: Skeleton, up: np.ndarray, step: FloatArray) -> np.ndarray:
+    """(r,) bool: rings with which a new sweep begins. `up` is the ring before along the tube."""
+    count = len(up)
+    one = up
+    two = np.where(one >= 0, up[one], -1)
+    three = np.where(two >= 0, up[two], -1)
+    # ring `after` <- here <- one <- two <- three: two steps before the joint `one`, two after it
+    after = np.full(count, -1)
+    rows = np.flatnonzero(up >= 0)
+    after[up[rows]] = rows
+    here = np.flatnonzero((three >= 0) & (after >= 0))
+    chain = np.stack([three[here], two[here], one[here], here, after[here]])
+    length = step[chain[1:]]
+    slope = np.diff(rings.radius[chain], axis=0) / np.maximum(length, np.finfo(float).tiny)
+
+    def even(i: int, j: int, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+        longer = np.maximum(length[i], length[j])
+        same_step = np.abs(length[i] - length[j]) <= tolerance * longer
+        return same_step, np.abs(slope[i] - slope[j]) <= tolerance
+
+    runs = np.logical_and.reduce([*even(0, 1, EVEN), *even(2, 3, EVEN)])
+    same_step, same_slope = even(1, 2, JUMP)
+    joint = np.zeros(count, dtype=bool)
+    joint[here[runs & ~(same_step & same_slope)]] = True
+    return joint
