@@ -31,8 +31,12 @@ DATA_TEXTURE_WIDTH = 3 * 1024
 
 @dataclass(frozen=True)
 class MaterialGroup:
-    """The faces of one material: `count` faces from `first` on, in the order of `face_order`."""
+    """The faces of one material: `count` faces from `first` on, in the order of `face_order`.
 
+    number: the material's index in the plant.
+    """
+
+    number: int
     material: Material
     first: int
     count: int
@@ -139,6 +143,7 @@ class PlantBuffers:
         firsts = np.concatenate([[0], np.cumsum(counts)[:-1]])
         return tuple(
             MaterialGroup(
+                number,
                 material,
                 int(first),
                 int(count),
@@ -147,7 +152,9 @@ class PlantBuffers:
                 if material.normal_texture is None
                 else self._texture(material.normal_texture, False, False),
             )
-            for material, first, count in zip(self.plant.materials, firsts, counts, strict=True)
+            for number, (material, first, count) in enumerate(
+                zip(self.plant.materials, firsts, counts, strict=True)
+            )
             if count
         )
 

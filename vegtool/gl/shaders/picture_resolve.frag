@@ -1,0 +1,42 @@
+// K x K samples to one texel: colour averaged in linear light over what is covered (straight
+// alpha), coverage as alpha, normals averaged and made unit again, depth averaged.
+#include "srgb.glsl"
+
+uniform sampler2D color_samples;
+uniform sampler2D normal_samples;
+uniform sampler2D depth_samples;
+uniform int samples;
+uniform int first_row;
+
+layout(location = 0) out vec4 out_color;
+layout(location = 1) out vec4 out_normal;
+layout(location = 2) out float out_depth;
+
+void main() {
+    ivec2 corner = (ivec2(gl_FragCoord.xy) - ivec2(0, first_row)) * samples;
+    vec3 color = vec3(0.0), normal = vec3(0.0);
+    float depth = 0.0, covered = 0.0;
+    for (int y = 0; y < samples; ++y) {
+        for (int x = 0; x < samples; ++x) {
+            ivec2 at = corner + ivec2(x, y);
+            vec4 sampled = texelFetch(color_samples, at, 0);
+            if (sampled.a > 0.5) {
+                covered += 1.0;
+                color += sampled.rgb * sampled.rgb;
+                normal += texelFetch(normal_samples, at, 0).xyz * (1023.0 / 511.0) - 512.0 / 511.0;
+                depth += texelFetch(depth_samples, at, 0).x;
+            }
+        }
+    }
+    out_color = vec4(0.0);
+    out_normal = vec4(128.0, 128.0, 255.0, 255.0) / 255.0;
+    out_depth = 0.0;
+    if (covered > 0.0) {
+        out_color = vec4(srgb_from_linear(color / covered), covered / float(samples * samples));
+        vec3 n = normalize(normal);
+        n.z = max(n.z, 0.01);  // blue above one half, as glTF asks
+        out_normal.xyz = floor(n * 127.5 + 128.001) / 255.0;
+        float signed_depth = (1.0 - 2.0 * depth / covered) / 0.999;
+        out_depth = (floor(clamp(signed_depth, -1.0, 1.0) * 32767.0 + 0.5) + 32768.0) / 65535.0;
+    }
+}
