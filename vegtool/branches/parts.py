@@ -25,7 +25,7 @@ RUNS_PER_PART = 1.5  # at most so many stretches of the file per part: the order
 class Parts:
     """Connected parts of a set of faces, with their welded vertices.
 
-    faces: (f, 3) int64 indices into positions. positions: (v, 3) in units of the plant's radius;
+    faces: (f, 3) int64 indices into positions, numbered as the faces show them. positions: (v, 3) in units of the plant's radius;
     vertices of two parts are never one. face_part: (f,) part of each face, in order of first face.
     vertex_part: (v,). soup: whether the file's vertices had to be welded across faces.
     """
@@ -52,10 +52,8 @@ def connected_parts(positions: FloatArray, faces: np.ndarray) -> Parts:
     soup = len(faces) < SOUP_FACES_PER_PART * (part.max() + 1)
     if soup:
         part = _soup_parts(place)
-    part = _by_first_face(part)
-    _, first, vertex = np.unique(
-        (part[:, None] * (place.max() + 1) + place).ravel(), return_index=True, return_inverse=True
-    )
+    part, _ = _by_first(part)
+    vertex, first = _by_first((part[:, None] * (place.max() + 1) + place).ravel())
     corner = faces.ravel()[first]
     return Parts(vertex.reshape(-1, 3), positions[corner], part, part[first // 3], soup)
 
@@ -106,8 +104,10 @@ def _soup_parts(place: np.ndarray) -> Labels:
     return _face_parts(np.unique(keyed, return_inverse=True)[1].reshape(-1, 3))
 
 
-def _by_first_face(part: Labels) -> Labels:
-    _, first, inverse = np.unique(part, return_index=True, return_inverse=True)
+def _by_first(labels: Labels) -> tuple[Labels, np.ndarray]:
+    """The labels renumbered in the order in which they first appear, and where each does."""
+    _, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
+    order = np.argsort(first)
     rank = np.empty(len(first), dtype=np.int64)
-    rank[np.argsort(first)] = np.arange(len(first))
-    return np.asarray(rank[inverse])
+    rank[order] = np.arange(len(first))
+    return rank[inverse], first[order]

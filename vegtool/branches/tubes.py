@@ -16,7 +16,7 @@ from vegtool.arrays import FloatArray
 from vegtool.branches.skeleton import Skeleton
 
 SPUR = 2.0  # radii: a side arm shorter than this belongs to the tube it stands on
-EVEN = 0.01  # steps of one sweep are equal to within this fraction, tapers to this slope
+EVEN = 1e-4  # steps of one sweep are equal to within this fraction, tapers to this slope
 JUMP = 0.05  # and those of two differ by more
 
 
