@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from io import BytesIO
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -144,9 +145,7 @@ def test_index_size_grows_with_the_vertices(vertices, dtype):
 
 
 def test_vertices_that_no_face_uses_are_left_out():
-    plant = leafy_plant(
-        faces=leafy_plant().faces[[0, 2]], face_material=np.array([0, 1], np.int32)
-    )
+    plant = leafy_plant(faces=leafy_plant().faces[[0, 2]], face_material=np.array([0, 1], np.int32))
     stored = parse(plant_glb(plant)).primitive(0, 1)
     assert np.array_equal(stored["POSITION"], plant.positions[4:7])
     assert stored["indices"].tolist() == [0, 1, 2]
@@ -227,7 +226,7 @@ def test_screen_coverage_decreases_strictly_from_at_most_one(distances):
     levels = (chain.levels[0], *(billboard_level(1, near=d) for d in distances))
     coverage = screen_coverage(replace(chain, levels=levels))
     assert coverage[0] <= 1
-    assert all(a > b > 0 for a, b in zip(coverage, coverage[1:], strict=False))
+    assert all(a > b > 0 for a, b in pairwise(coverage))
 
 
 def test_levels_of_a_far_chain_share_one_origin():

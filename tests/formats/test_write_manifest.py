@@ -1,0 +1,104 @@
+"""The manifest and its schema."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from math import radians, tan
+from pathlib import Path
+
+import jsonschema
+import pytest
+from written import small_chain
+
+from vegtool.errors import InputError
+from vegtool.formats.gltf import write_chain
+from vegtool.formats.manifest import FADE_FRACTION, LevelFile, manifest, read_manifest, schema
+
+FILES = [LevelFile("tree.glb", 300), LevelFile("tree_LOD1.glb", 200), LevelFile("tree_LOD2.glb", 9)]
+
+
+def test_a_manifest_follows_its_schema():
+    jsonschema.Draft202012Validator.check_schema(schema())
+    jsonschema.validate(manifest(small_chain(), FILES), schema())
+
+
+def test_levels_say_what_is_drawn_and_from_where():
+    chain = small_chain()
+    chain = replace(
+        chain,
+        levels=(
+            chain.levels[0],
+            *(replace(level, geometric_error_m=(0.5, 0.25)) for level in chain.levels[1:]),
+        ),
+    )
+    original, first, second = manifest(chain, FILES)["levels"]
+    assert (original["file"], original["kind"], original["switch_distance_m"]) == (
+        "tree.glb",
+        "mesh",
+        0.0,
+    )
+    assert original["screen_height_fraction"] is None
+    assert original["geometric_error_m"] is None
+    assert (first["triangles"], first["billboards"], first["bytes"]) == (6, 3, 200)
+    assert second["triangles"] == 4  # one billboard, front and back
+    assert first["texels"] == 2 * 16 * 32
+    assert (first["switch_distance_m"], second["switch_distance_m"]) == (10.0, 20.0)
+    assert first["fade_end_m"] == 10.0
+    assert first["fade_start_m"] == (1 - FADE_FRACTION) * 10.0
+    # The plant is 1 m high; the image shows 2 * 10 m * tan(30 degrees) at the switch distance.
+    assert first["screen_height_fraction"] == pytest.approx(1 / (20 * tan(radians(30))))
+    assert first["geometric_error_m"] == {"max": 0.5, "p95": 0.25}
+    assert first["measured"] is None
+
+
+def test_a_manifest_needs_one_file_per_level():
+    with pytest.raises(ValueError, match="3 levels"):
+        manifest(small_chain(), FILES[:2])
+
+
+def test_what_was_written_reads_back(tmp_path: Path):
+    write_chain(small_chain(), tmp_path, depth=True)
+    values = read_manifest(tmp_path / "tree.lod.json")
+    jsonschema.validate(values, schema())
+    assert values["options"] == small_chain().options
+    assert [level.get("depth") for level in values["levels"]] == [
+        None,
+        "tree_LOD1_depth.png",
+        "tree_LOD2_depth.png",
+    ]
+    for entry in (values["combined"], *values["levels"]):
+        assert (tmp_path / entry["file"]).stat().st_size == entry["bytes"]
+
+
+def broken(change) -> bytes:
+    values = manifest(small_chain(), FILES)
+    change(values)
+    return json.dumps(values).encode()
+
+
+@pytest.mark.parametrize(
+    ("data", "says"),
+    [
+        (None, "cannot be read"),
+        (b"glTF\0\xff", "found no JSON"),
+        (b"[]", "version 1, found none"),
+        (b"{}", "version 1, found none"),
+        (b'{"version": 99}', "version 1, found version 99"),
+        (broken(lambda v: v.pop("levels")), "lacks the key 'levels'"),
+        (broken(lambda v: v["levels"].clear()), "levels: expected at least 1, found 0"),
+        (broken(lambda v: v["levels"][1].pop("file")), "levels.1: lacks the key 'file'"),
+        (
+            broken(lambda v: v["levels"][1].update(switch_distance_m="near")),
+            "levels.1.switch_distance_m: expected number, found 'near'",
+        ),
+    ],
+)
+def test_a_broken_manifest_is_refused_by_name(tmp_path: Path, data, says):
+    path = tmp_path / "oak.lod.json"
+    if data is not None:
+        path.write_bytes(data)
+    with pytest.raises(InputError) as caught:
+        read_manifest(path)
+    assert str(path) in str(caught.value)
+    assert says in str(caught.value)
