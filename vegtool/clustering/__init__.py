@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 METHODS: dict[str, tuple[str, str]] = {
     "kmeans": ("kmeans:kmeans", "compact clusters of close faces that face the same way"),
+    "isodata": ("isodata:isodata", "long and thin clusters, split and merged by size"),
+    "branches": ("branches:branches", "whole branches, then parts of the least compact ones"),
 }
 """Name -> (module:function within this room, summary)."""
 
@@ -30,15 +32,25 @@ class ClusterOptions:
     orientation_weight: length, in plant radii, of one unit of face orientation (Frobenius distance
     of the tensors n n^T; two faces at right angles are sqrt 2 apart). 0 is the paper: positions
     alone.
+    elongation: how many times as long as wide the clusters of `isodata` shall be; 1 is compact.
+    strict_level: `branches` stops at the branching level, as in the paper, and leaves the rest of
+    the count unused.
     """
 
     orientation_weight: float = 0.1
+    elongation: float = 3.0
+    strict_level: bool = False
 
     def __post_init__(self) -> None:
         if not 0 <= self.orientation_weight <= 1e3:
             raise UsageError(
                 f"orientation weight: expected 0 to 1000 plant radii, got {self.orientation_weight}"
                 "; 0 clusters by position alone, 0.1 is the default"
+            )
+        if not 1 <= self.elongation <= 1e3:
+            raise UsageError(
+                f"elongation: expected 1 to 1000, got {self.elongation}"
+                "; 1 makes compact clusters, 3 is the default"
             )
 
 

@@ -60,27 +60,47 @@ def face_weights(plant: Plant) -> FloatArray:
     return np.asarray(weights / weights.sum())
 
 
-def samples(plant: Plant, orientation_weight: float, count: int) -> Samples:
-    """The plant's pieces as points, or its faces where `count` asks for more than pieces."""
+def samples(
+    plant: Plant, orientation_weight: float, count: int, group: Labels | None = None
+) -> Samples:
+    """The plant's pieces as points, or its faces where `count` asks for more than pieces.
+
+    group: (f,) faces of different groups never become one point.
+    """
     features = face_features(plant, orientation_weight)
     weights = face_weights(plant)
-    pieces = _grouped(features, weights, quads(plant))
-    pieces = _merged(pieces, cells(pieces.points, SAME))
+    pieces = _grouped(features, weights, quads(plant, group))
+    pieces = coarser(pieces, SAME, group)
     if len(pieces.points) >= count:
         return pieces
-    return _grouped(features, weights, cells(features, SAME))
+    return _grouped(features, weights, cells(features, SAME, group))
 
 
-def coarse(fine: Samples, limit: int) -> Samples:
+def coarse(fine: Samples, limit: int, group: Labels | None = None) -> Samples:
     """`fine` with the points that share a grid cell made one, if there are more than `limit`."""
     edge, result = 1 / 128, fine
-    while len(result.points) > limit:
-        result = _merged(fine, cells(fine.points, edge))
+    while len(result.points) > limit and edge < 1:
+        result = coarser(fine, edge, group)
         edge *= 1.25
     return result
 
 
-def quads(plant: Plant) -> Labels:
+def coarser(fine: Samples, edge: float, group: Labels | None = None) -> Samples:
+    """`fine` with the points that share a cell of the grid with that edge made one."""
+    of_point = None if group is None else spread_to(fine.of_face, group)
+    cell = cells(fine.points, edge, of_point)
+    result = _grouped(fine.points, fine.weights, cell)
+    return Samples(result.points, result.weights, cell[fine.of_face])
+
+
+def spread_to(of_face: Labels, group: Labels) -> Labels:
+    """(n,) the group that each point, or each cluster, lies in, from that of its faces."""
+    result = np.empty(int(of_face.max()) + 1, dtype=np.int64)
+    result[of_face] = group
+    return result
+
+
+def quads(plant: Plant, group: Labels | None = None) -> Labels:
     """(f,) piece of each face: faces that share their longest edge, by position, and are parallel.
 
     The longest edge of a quad's halves is its diagonal. Faces need not share vertex indices.
@@ -90,18 +110,21 @@ def quads(plant: Plant) -> Labels:
     longest = np.einsum("fij,fij->fi", edges, edges).argmax(axis=1)
     rows = np.arange(len(corners))
     middle = corners[rows, longest] + corners[rows, longest - 1]  # a + b equals b + a exactly
-    group = _same_rows((middle + 0.0).view(np.int64))  # + 0.0: no negative zero
-    first = np.full(group.max() + 1, len(rows))
-    np.minimum.at(first, group, rows)
-    leader = first[group]
+    same = _same_rows((middle + 0.0).view(np.int64))  # + 0.0: no negative zero
+    first = np.full(same.max() + 1, len(rows))
+    np.minimum.at(first, same, rows)
+    leader = first[same]
     normal = unit(plant.face_area_vectors / (plant.radius or 1.0) ** 2)
-    parallel = np.abs(np.einsum("fi,fi->f", normal, normal[leader])) > PARALLEL
-    return np.unique(np.where(parallel, leader, rows), return_inverse=True)[1]
+    fits = np.abs(np.einsum("fi,fi->f", normal, normal[leader])) > PARALLEL
+    if group is not None:
+        fits &= group == group[leader]
+    return np.unique(np.where(fits, leader, rows), return_inverse=True)[1]
 
 
-def cells(points: FloatArray, edge: float) -> Labels:
+def cells(points: FloatArray, edge: float, group: Labels | None = None) -> Labels:
     """(n,) which cell, of that edge length, of a grid in feature space each point lies in."""
-    return _same_rows(np.floor(points / edge + 0.5).astype(np.int64))
+    rows = np.floor(points / edge + 0.5).astype(np.int64)
+    return _same_rows(rows if group is None else np.concatenate([rows, group[:, None]], axis=1))
 
 
 def _same_rows(rows: npt.NDArray[np.int64]) -> Labels:
@@ -119,9 +142,3 @@ def _grouped(points: FloatArray, weights: FloatArray, group: Labels) -> Samples:
     total: FloatArray = np.bincount(group, weights).astype(np.float64)
     means = [np.bincount(group, weights * column) / total for column in points.T]
     return Samples(np.stack(means, axis=1), total, group)
-
-
-def _merged(fine: Samples, group: Labels) -> Samples:
-    """`_grouped` for points that are groups of faces already."""
-    result = _grouped(fine.points, fine.weights, group)
-    return Samples(result.points, result.weights, group[fine.of_face])

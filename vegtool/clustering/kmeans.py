@@ -28,19 +28,18 @@ def kmeans(
 ) -> IntArray:
     """(f,) int32 labels of at most `count` compact clusters."""
     fine = samples(plant, options.orientation_weight, count)
-    return np.asarray(partition(fine, count)[fine.of_face], dtype=np.int32)
-
-
-def partition(fine: Samples, count: int) -> Labels:
-    """(n,) labels of the sample points: min(count, n) clusters."""
     few = coarse(fine, limit=max(CELLS, 8 * count))
+    labels = settle(few, np.zeros(len(few.points), dtype=np.int64), count)
+    if few is not fine:
+        exact = nearest(fine.points, means(few.points, few.weights, labels)[0])
+        labels = fill(fine.points, fine.weights, compacted(exact), count)
+    return np.asarray(labels[fine.of_face], dtype=np.int32)
+
+
+def settle(few: Samples, labels: Labels, count: int, group: Labels | None = None) -> Labels:
+    """Split, merge and move until `count` clusters have little error, each within its group."""
     points, weights = few.points, few.weights
-    labels = np.zeros(len(points), dtype=np.int64)
     labels = split(points, weights, labels, min(OVERSHOOT * count, len(points)))
-    labels = lloyd(points, weights, labels, 2, count)
-    labels = merge(points, weights, labels, count)
-    labels = lloyd(points, weights, labels, ROUNDS, count)
-    if few is fine:
-        return labels
-    exact = nearest(fine.points, means(points, weights, labels)[0])
-    return fill(fine.points, fine.weights, compacted(exact), count)
+    labels = lloyd(points, weights, labels, 2, count, group)
+    labels = merge(points, weights, labels, count, group)
+    return lloyd(points, weights, labels, ROUNDS, count, group)

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from vegtool.arrays import FloatArray
-from vegtool.clustering.features import Labels
+from vegtool.clustering.features import Labels, spread_to
 
 NEIGHBOURS = 8  # means next to a mean that it may merge with
 
@@ -41,33 +41,53 @@ def split(points: FloatArray, weights: FloatArray, labels: Labels, count: int) -
     k = int(labels.max()) + 1
     while k < count:
         center, _ = means(points, weights, labels)
-        offset = points - center[labels]
-        along = [np.bincount(labels, weights * column**2) for column in offset.T]
-        variance = np.stack(along, axis=1)
-        worst = np.argsort(-variance.sum(axis=1), kind="stable")[: min(count - k, (k + 1) // 2)]
-        new = np.full(k, -1)
-        new[worst] = k + np.arange(len(worst))
-        side = offset[np.arange(len(points)), variance.argmax(axis=1)[labels]] > 0
-        labels = compacted(np.where(side & (new[labels] >= 0), new[labels], labels))
+        labels = cut(points - center[labels], weights, labels, min(count - k, (k + 1) // 2))
         before, k = k, int(labels.max()) + 1
         if k == before:  # the worst clusters are single points, or all but
             return fill(points, weights, labels, count)
     return labels
 
 
-def merge(points: FloatArray, weights: FloatArray, labels: Labels, count: int) -> Labels:
+def cut(offset: FloatArray, weights: FloatArray, labels: Labels, worst: int) -> Labels:
+    """Cut the `worst` clusters with the largest error in two, each at its mean.
+
+    offset: (n, d) points relative to their cluster's mean, in any frame of the cluster's; the cut
+    lies across the axis along which the cluster varies most.
+    """
+    k = int(labels.max()) + 1
+    variance = np.stack([np.bincount(labels, weights * column**2) for column in offset.T], axis=1)
+    chosen = np.argsort(-variance.sum(axis=1), kind="stable")[:worst]
+    new = np.full(k, -1)
+    new[chosen] = k + np.arange(len(chosen))
+    side = offset[np.arange(len(offset)), variance.argmax(axis=1)[labels]] > 0
+    return compacted(np.where(side & (new[labels] >= 0), new[labels], labels))
+
+
+def merge(
+    points: FloatArray,
+    weights: FloatArray,
+    labels: Labels,
+    count: int,
+    group: Labels | None = None,
+) -> Labels:
     """Merge until there are `count` clusters: the neighbours that add the least error first.
 
     A round merges disjoint pairs, at most half of the surplus, and then looks again.
+    group: (n,) clusters merge only within their group; `count` is at least the groups'.
     """
     from scipy.spatial import cKDTree
 
     k = int(labels.max()) + 1
     while k > count:
         center, mass = means(points, weights, labels)
+        of_cluster = None if group is None else spread_to(labels, group)
+        center = set_apart(center, of_cluster)
         distance, near = cKDTree(center).query(center, k=min(NEIGHBOURS + 1, k))
         a = np.repeat(np.arange(k), near.shape[1])  # itself too, which disjoint_pairs skips
         b, squared = near.ravel(), distance.ravel() ** 2
+        if of_cluster is not None:
+            within = of_cluster[a] == of_cluster[b]
+            a, b, squared = a[within], b[within], squared[within]
         added = squared * mass[a] * mass[b] / (mass[a] + mass[b])
         order = np.argsort(added, kind="stable")
         into = disjoint_pairs(a[order], b[order], k, limit=(k - count + 1) // 2)
@@ -92,14 +112,25 @@ def disjoint_pairs(a: Labels, b: Labels, k: int, limit: int) -> Labels:
 
 
 def lloyd(
-    points: FloatArray, weights: FloatArray, labels: Labels, rounds: int, count: int
+    points: FloatArray,
+    weights: FloatArray,
+    labels: Labels,
+    rounds: int,
+    count: int,
+    group: Labels | None = None,
 ) -> Labels:
     """Move every point to the nearest mean, `rounds` times or until nothing moves.
 
     Clusters that run empty are filled again, so that `count` remain.
+    group: (n,) points move only between the clusters of their group.
     """
     for _ in range(rounds):
-        moved = nearest(points, means(points, weights, labels)[0])
+        center, _ = means(points, weights, labels)
+        if group is None:
+            moved = nearest(points, center)
+        else:
+            of_cluster = spread_to(labels, group)
+            moved = nearest(set_apart(points, group), set_apart(center, of_cluster))
         moved = fill(points, weights, compacted(moved), count)
         if np.array_equal(moved, labels):
             break
@@ -112,6 +143,14 @@ def nearest(points: FloatArray, center: FloatArray) -> Labels:
     from scipy.spatial import cKDTree
 
     return np.asarray(cKDTree(center).query(points)[1])
+
+
+def set_apart(points: FloatArray, group: Labels | None) -> FloatArray:
+    """Points with one more coordinate, which keeps groups farther apart than any two points."""
+    if group is None:
+        return points
+    reach = 2 * (1 + np.abs(points).sum(axis=1).max())
+    return np.concatenate([points, reach * group[:, None]], axis=1)
 
 
 def fill(points: FloatArray, weights: FloatArray, labels: Labels, count: int) -> Labels:
