@@ -1,0 +1,103 @@
+"""Model files in, level-of-detail files out: the only place that opens model files.
+
+Reading: `read_plant(path, ReadOptions())` gives a Plant, whatever the format; a new format is one
+line in READERS. What each format's quirks become is written in docs/formats.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from vegtool.errors import CapabilityError, InputError, UsageError
+
+if TYPE_CHECKING:
+    from vegtool.plant import Plant
+
+READERS = {
+    ".glb": "vegtool.formats.read_gltf",
+    ".gltf": "vegtool.formats.read_gltf",
+    ".obj": "vegtool.formats.read_obj",
+    ".ply": "vegtool.formats.read_mesh",
+    ".stl": "vegtool.formats.read_mesh",
+}
+"""File name extension -> module whose `parse(path)` gives Parsed (see parts.py)."""
+
+CONVERTERS = {
+    ".fbx": "Blender (File > Import > FBX, then File > Export > glTF 2.0), FBX2glTF or assimp",
+    ".blend": "Blender (File > Export > glTF 2.0)",
+    ".usd": "Blender (File > Import > Universal Scene Description, then File > Export > glTF 2.0)",
+    ".usdz": "Blender (File > Import > Universal Scene Description, then File > Export > glTF 2.0)",
+    ".dae": "Blender before 5.0 or assimp",
+    ".3ds": "assimp",
+    ".max": "3ds Max (File > Export > glTF)",
+    ".spm": "the SpeedTree Modeler (File > Export mesh)",
+}
+"""Formats that vegtool cannot read, and what turns them into GLB."""
+
+METRES_PER = {"mm": 0.001, "cm": 0.01, "dm": 0.1, "m": 1.0, "in": 0.0254, "ft": 0.3048}
+
+UP_AXES = ("auto", "x", "y", "z", "-x", "-y", "-z")
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """How to understand a file that does not say so itself.
+
+    unit: length of the file's unit: mm, cm, dm, m, in, ft, or a number of metres.
+    up: the file's upward axis; "auto" is the format's convention (glTF: y) or, where it has none,
+    a guess from the geometry.
+    leaf_materials: names or patterns (`leaf*`) of the materials that are leaves, all others being
+    wood; empty for a guess.
+    """
+
+    unit: str = "m"
+    up: str = "auto"
+    leaf_materials: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.up not in UP_AXES:
+            raise UsageError(f"--up: expected one of {', '.join(UP_AXES)}; found {self.up!r}")
+        if not 0 < self.metres < float("inf"):
+            raise UsageError(f"--unit: expected a positive number of metres; found {self.unit!r}")
+
+    @property
+    def metres(self) -> float:
+        """Metres per unit of the file."""
+        if self.unit in METRES_PER:
+            return METRES_PER[self.unit]
+        try:
+            return float(self.unit)
+        except ValueError:
+            raise UsageError(
+                f"--unit: expected {', '.join(METRES_PER)} or a number of metres; "
+                f"found {self.unit!r}"
+            ) from None
+
+
+def read_plant(path: str | Path, options: ReadOptions = ReadOptions()) -> Plant:  # noqa: B008
+    """Read a plant model.
+
+    Raises InputError for a file that is missing, broken or not a plant, CapabilityError for one
+    that needs a converter or a decoder that is not here; each message names file and remedy.
+    """
+    path = Path(path)
+    extension = path.suffix.lower()
+    if extension in CONVERTERS:
+        raise CapabilityError(
+            f"{path}: {extension[1:].upper()} files cannot be read; convert it to GLB with "
+            f"{CONVERTERS[extension]}, then read the GLB"
+        )
+    if extension not in READERS:
+        raise InputError(
+            f"{path}: expected a model file ({', '.join(READERS)}), found "
+            f"{extension or 'no file name extension'}; convert or rename it"
+        )
+    if not path.is_file():
+        found = "a folder" if path.is_dir() else "nothing"
+        raise InputError(f"{path}: expected a model file, found {found} there; check the path")
+    from vegtool.formats.read import assemble  # numpy and Pillow load only when a file is read
+
+    return assemble(import_module(READERS[extension]).parse(path), path, options)

@@ -1,0 +1,140 @@
+"""What a file says of its branches -> Branches: completed by geometry where the file is silent.
+
+The file's word is kept. Where it names branches and their levels but not their parents (groups, an
+attribute), each branch hangs on the branch of the level above whose surface is nearest to its
+base; faces of which it says nothing (leaves) hang on the nearest wood.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vegtool.arrays import IntArray
+from vegtool.formats.parts import Declared
+from vegtool.plant import Branches, Plant
+
+FEWEST = 3
+"""Branches below which a file's parts are taken for something else (trunk and leaves)."""
+BASE_POINTS = 3
+"""Points at the start of a tube, in the order of the file, that stand for its base."""
+
+
+def resolve_branches(
+    plant: Plant, face_branch: IntArray, declared: Declared | None, notes: list[str]
+) -> Branches | None:
+    """The plant's branches as declared, or None where the file's parts are no branches.
+
+    face_branch: (f,) index of each face's declared branch, -1 for none.
+    """
+    if declared is None or (face_branch < 0).all():
+        return None
+    wood = ~plant.face_is_leaf
+    if declared.parent is None and declared.level is None:
+        notes.append("the file names branches but not how they hang together; ignored")
+        return None
+    if declared.parent is not None:
+        parent = declared.parent
+    else:
+        assert declared.level is not None
+        found = _parents_by_level(plant, face_branch, declared.level, wood)
+        if found is None:
+            notes.append("the file's branch levels leave gaps; ignored")
+            return None
+        parent = found
+        notes.append("the file names its branches; their parents were found by the nearest surface")
+    face_branch, parent = _without_woodless(face_branch, parent, wood)
+    if len(parent) < FEWEST or np.bincount(parent[parent >= 0], minlength=1).max() < 2:
+        return None  # one part per level, or trunk and crown: not one part per branch
+    level = _levels(parent)
+    if level is None:
+        notes.append("the file's branches hang on each other in a circle; ignored")
+        return None
+    loose = face_branch < 0
+    if loose.any():
+        face_branch = _hang_on_nearest(plant, face_branch)
+        notes.append(f"hung {loose.sum()} faces of no declared branch on the nearest wood")
+    return Branches(
+        face_branch.astype(np.int32),
+        parent.astype(np.int32),
+        level.astype(np.int32),
+        declared.source,
+    )
+
+
+def _without_woodless(
+    face_branch: IntArray, parent: IntArray, wood: np.ndarray
+) -> tuple[IntArray, IntArray]:
+    """Branches that have wood; the faces of others (leaf nodes, empty joints) go to the nearest
+    ancestor that has, or to none."""
+    has_wood = np.zeros(len(parent), dtype=bool)
+    has_wood[face_branch[wood & (face_branch >= 0)]] = True
+    above = np.where(has_wood, np.arange(len(parent)), parent)
+    for _ in range(len(parent)):
+        woodless = (above >= 0) & ~has_wood[above]
+        if not woodless.any():
+            break
+        above[woodless] = parent[above[woodless]]
+    else:
+        above[(above >= 0) & ~has_wood[above]] = -1  # a circle
+    index = np.append(np.cumsum(has_wood) - 1, -1)
+    own_parent = np.where(parent >= 0, above[parent], -1)[has_wood]
+    return index[np.where(face_branch >= 0, above[face_branch], -1)], index[own_parent]
+
+
+def _levels(parent: IntArray) -> IntArray | None:
+    """(b,) steps to the trunk, or None where parents form a circle."""
+    level = np.zeros(len(parent), dtype=np.int64)
+    above = parent.copy()
+    for _ in range(len(parent)):
+        climbing = above >= 0
+        if not climbing.any():
+            return level
+        level[climbing] += 1
+        above[climbing] = parent[above[climbing]]
+    return level if not (above >= 0).any() else None
+
+
+def _parents_by_level(
+    plant: Plant, face_branch: IntArray, level: IntArray, wood: np.ndarray
+) -> IntArray | None:
+    """(b,) parents: of the branches one level above, the one nearest to a branch's base.
+
+    None where a branch that has wood has no level or no branch above it.
+    """
+    from scipy.spatial import cKDTree
+
+    faces = plant.faces[wood & (face_branch >= 0)]
+    owner = face_branch[wood & (face_branch >= 0)]
+    vertex_owner = np.full(len(plant.positions), -1, dtype=np.int64)
+    vertex_owner[faces.ravel()] = np.repeat(owner, 3)
+    vertices = np.flatnonzero(vertex_owner >= 0)
+    by_branch = vertices[np.argsort(vertex_owner[vertices], kind="stable")]
+    branches, first = np.unique(vertex_owner[by_branch], return_index=True)
+    parent = np.full(len(level), -1, dtype=np.int64)
+    for current in range(1, int(level[branches].max(initial=0)) + 1):
+        above = vertices[level[vertex_owner[vertices]] == current - 1]
+        here = level[branches] == current
+        if not here.any():
+            continue
+        if not len(above):
+            return None
+        base = by_branch[first[here][:, None] + np.arange(BASE_POINTS)]
+        tree = cKDTree(plant.positions[above])
+        _, nearest = tree.query(plant.positions[base].mean(axis=1))
+        parent[branches[here]] = vertex_owner[above[nearest]]
+    return None if (level[branches] < 0).any() else parent
+
+
+def _hang_on_nearest(plant: Plant, face_branch: IntArray) -> IntArray:
+    """Every face without a branch gets that of the wood nearest to any of its corners."""
+    from scipy.spatial import cKDTree
+
+    known = np.flatnonzero(face_branch >= 0)
+    owner = np.repeat(face_branch[known], 3)
+    tree = cKDTree(plant.corners[known].reshape(-1, 3))
+    loose = np.flatnonzero(face_branch < 0)
+    distance, nearest = tree.query(plant.corners[loose].reshape(-1, 3))
+    best = distance.reshape(-1, 3).argmin(axis=1)
+    filled = face_branch.copy()
+    filled[loose] = owner[nearest.reshape(-1, 3)[np.arange(len(loose)), best]]
+    return filled

@@ -1,0 +1,174 @@
+"""Materials and textures of glTF 2.0.
+
+Sources: glTF 2.0 specification, 3.9; KHR_texture_transform, KHR_texture_basisu, EXT_texture_webp,
+KHR_materials_pbrSpecularGlossiness, KHR_techniques_webgl (its diffuse texture only).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vegtool.arrays import FloatArray
+from vegtool.errors import CapabilityError
+from vegtool.formats.alpha import DEFAULT_CUTOFF, settle_alpha
+from vegtool.formats.gltf_data import GltfFile
+from vegtool.formats.images import decode
+from vegtool.plant import Material, Texture
+
+
+@dataclass(frozen=True, eq=False)
+class UvSource:
+    """Which texture coordinates a material reads, and the (2, 3) transform it puts on them."""
+
+    set: int = 0
+    transform: FloatArray | None = None
+
+    def same_as(self, other: UvSource) -> bool:
+        """Whether both give the same coordinates."""
+        mine = np.eye(2, 3) if self.transform is None else self.transform
+        theirs = np.eye(2, 3) if other.transform is None else other.transform
+        return self.set == other.set and np.allclose(mine, theirs)
+
+
+@dataclass(frozen=True, eq=False)
+class ReadMaterial:
+    """A material and where its texture coordinates come from."""
+
+    material: Material
+    uvs: UvSource
+
+
+def read_materials(file: GltfFile, notes: list[str]) -> list[ReadMaterial]:
+    """The file's materials, and one more, glTF's default, for meshes without."""
+    images: dict[int, Texture | None] = {}
+    entries = file.json.get("materials", [])
+    found = [
+        _read_material(file, entry, str(entry.get("name") or f"material_{k}"), images, notes)
+        for k, entry in enumerate(entries)
+    ]
+    return [*found, ReadMaterial(Material("default", metallic=0.0), UvSource())]
+
+
+def _read_material(
+    file: GltfFile,
+    entry: dict[str, Any],
+    name: str,
+    images: dict[int, Texture | None],
+    notes: list[str],
+) -> ReadMaterial:
+    surface = entry.get("pbrMetallicRoughness", {})
+    extensions = entry.get("extensions", {})
+    glossy = extensions.get("KHR_materials_pbrSpecularGlossiness")
+    shader = extensions.get("KHR_techniques_webgl")
+    factor = surface.get("baseColorFactor", [1, 1, 1, 1])
+    info = surface.get("baseColorTexture")
+    metallic, roughness = surface.get("metallicFactor", 1.0), surface.get("roughnessFactor", 1.0)
+    if glossy is not None:
+        factor = glossy.get("diffuseFactor", [1, 1, 1, 1])
+        info = glossy.get("diffuseTexture")
+        metallic, roughness = 0.0, 1.0 - glossy.get("glossinessFactor", 1.0)
+    elif shader is not None and info is None:
+        values = shader.get("values", {})
+        info = next((v for k, v in values.items() if "diffuse" in k and "index" in v), None)
+        metallic = 0.0
+        notes.append(f"material {name}: its own shader is left out, its diffuse texture is kept")
+    base_color = np.clip(np.array(factor, dtype=np.float64), 0.0, None)
+    texture, uvs = _texture(file, info, images, notes)
+    if "metallicRoughnessTexture" in surface and (metallic or roughness):
+        mean = _texture(file, surface["metallicRoughnessTexture"], images, notes)[0]
+        if mean is not None:
+            _, green, blue = mean.pixels[..., :3].reshape(-1, 3).mean(axis=0) / 255
+            metallic, roughness = metallic * blue, roughness * green
+    bumps = entry.get("normalTexture")
+    normal_texture, normal_uvs = _texture(file, bumps, images, notes)
+    if normal_texture is not None and texture is None:
+        uvs = normal_uvs
+    elif normal_texture is not None and not uvs.same_as(normal_uvs):
+        notes.append(f"material {name}: dropped its normal map, which has coordinates of its own")
+        normal_texture = None
+    mode, cutoff, base_color = settle_alpha(
+        name,
+        str(entry.get("alphaMode", "OPAQUE")),
+        float(entry.get("alphaCutoff", DEFAULT_CUTOFF)),
+        base_color,
+        texture,
+        notes,
+    )
+    material = Material(
+        name=name,
+        base_color=base_color,
+        color_texture=texture,
+        normal_texture=normal_texture,
+        normal_scale=float(bumps.get("scale", 1.0)) if bumps else 1.0,
+        alpha_mode=mode,
+        alpha_cutoff=cutoff,
+        double_sided=bool(entry.get("doubleSided", False)),
+        metallic=float(metallic),
+        roughness=float(roughness),
+    )
+    return ReadMaterial(material, uvs)
+
+
+def _texture(
+    file: GltfFile,
+    info: dict[str, Any] | None,
+    images: dict[int, Texture | None],
+    notes: list[str],
+) -> tuple[Texture | None, UvSource]:
+    """The texture of a textureInfo and the coordinates that it is laid on."""
+    if info is None:
+        return None, UvSource()
+    extension = info.get("extensions", {}).get("KHR_texture_transform", {})
+    uvs = UvSource(
+        int(extension.get("texCoord", info.get("texCoord", 0))), _uv_transform(extension)
+    )
+    image = _image_index(file, file.entry("textures", info.get("index")))
+    if image is None:
+        return None, uvs
+    if image not in images:
+        images[image] = _image(file, image, notes)
+    return images[image], uvs
+
+
+def _image_index(file: GltfFile, texture: dict[str, Any]) -> int | None:
+    extensions = texture.get("extensions", {})
+    source: int | None = texture.get("source")
+    if "EXT_texture_webp" in extensions:
+        return int(extensions["EXT_texture_webp"]["source"])
+    if source is None:
+        for name, what in (("KHR_texture_basisu", "KTX2"), ("EXT_texture_avif", "AVIF")):
+            if name in extensions:
+                raise CapabilityError(
+                    f"{file.path}: its textures are {what} ({name}), which vegtool cannot decode; "
+                    "convert them to PNG, for example with `gltf-transform png` or `ktx extract`"
+                )
+    return source
+
+
+def _image(file: GltfFile, index: int, notes: list[str]) -> Texture | None:
+    entry = file.entry("images", index)
+    uri = entry.get("uri")
+    short = uri if isinstance(uri, str) and not uri.startswith("data:") else ""
+    name = str(entry.get("name") or short or f"image_{index}")
+    if "bufferView" in entry:
+        data: bytes | None = bytes(file.view(entry["bufferView"]))
+    else:
+        data = file.resource(uri, f"images[{index}]")
+    if data is None:
+        notes.append(f"texture {short} is missing; its material is drawn in its plain colour")
+        return None
+    return decode(data, name, f"{file.path}: image {name}")
+
+
+def _uv_transform(extension: dict[str, Any]) -> FloatArray | None:
+    """(2, 3): translation x rotation x scale, as KHR_texture_transform writes it."""
+    if not {"offset", "rotation", "scale"} & extension.keys():
+        return None
+    (u, v), (s, t) = extension.get("offset", (0, 0)), extension.get("scale", (1, 1))
+    angle = float(extension.get("rotation", 0.0))
+    c, d = np.cos(angle), np.sin(angle)
+    matrix = np.array([[c * s, d * t, u], [-d * s, c * t, v]], dtype=np.float64)
+    return None if np.array_equal(matrix, np.eye(2, 3)) else matrix

@@ -1,0 +1,57 @@
+"""What every reader hands to `read.assemble`: the file's content, not yet cleaned or interpreted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from vegtool.arrays import FloatArray, IntArray
+from vegtool.plant import Material
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """Triangles that share one material, in the file's own unit and axes.
+
+    positions: (v, 3) float64, may hold NaN. faces: (f, 3) vertex indices, checked to be in range.
+    material: index into Parsed.materials. name: of the group, node or mesh, a hint for roles.
+    normals: (v, 3), uvs: (v, 2) from the top left corner, colors: (v, 4) linear; None if absent.
+    point: (v,) index of the file's own point where a reader had to split points into vertices
+    (OBJ), so that missing normals are smooth across the seams.
+    branch: (f,) or one int for all: index into Declared.parent, -1 where the file does not say.
+    """
+
+    positions: FloatArray
+    faces: IntArray
+    material: int
+    name: str = ""
+    normals: FloatArray | None = None
+    uvs: FloatArray | None = None
+    colors: FloatArray | None = None
+    point: IntArray | None = None
+    branch: IntArray | int = -1
+
+
+@dataclass(frozen=True, eq=False)
+class Declared:
+    """What a file says of its branches.
+
+    parent: (b,) index of the parent, -1 for a trunk; None where the file names branches only.
+    level: (b,) where the file states it, -1 where not; None where parents say it all.
+    """
+
+    source: Literal["nodes", "groups", "skeleton", "attribute"]
+    parent: IntArray | None = None
+    level: IntArray | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Parsed:
+    """A file's content. up: the format's upward axis, None where it has no convention."""
+
+    name: str
+    parts: list[Part]
+    materials: list[Material]
+    up: str | None = None
+    declared: Declared | None = None
+    notes: list[str] = field(default_factory=list)

@@ -1,0 +1,238 @@
+"""Parsed file -> Plant: cleaned, in metres, y up, its leaves told from its wood."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from vegtool.arrays import FloatArray, IntArray
+from vegtool.errors import InputError
+from vegtool.formats import ReadOptions
+from vegtool.formats.clean import (
+    finite_vertices,
+    flat_faces,
+    repeated_faces,
+    smooth_normals,
+)
+from vegtool.formats.declared import resolve_branches
+from vegtool.formats.parts import Parsed, Part
+from vegtool.formats.roles import guess_role, named_roles
+from vegtool.formats.upright import UPRIGHT, guess_up
+from vegtool.plant import Material, Plant
+
+MAX_FACES = 30_000_000
+"""More than that is a landscape, or an attack by instances of instances."""
+SHORTEST_NORMAL = 1e-6
+"""A stored normal shorter than this says nothing."""
+COARSE_STEP = 1e-4
+"""Fraction of the plant's diagonal: coordinates rounded to coarser steps deserve a warning."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Mesh:
+    """All parts as one mesh, in the file's unit relative to `origin`.
+
+    normals: (v, 3), zero where the file gives none. point: see Part. material, branch, part: (f,).
+    """
+
+    origin: FloatArray
+    positions: FloatArray
+    normals: FloatArray
+    uvs: FloatArray
+    colors: FloatArray | None
+    point: IntArray
+    faces: IntArray
+    material: IntArray
+    branch: IntArray
+    part: IntArray
+
+
+def assemble(parsed: Parsed, path: Path, options: ReadOptions) -> Plant:
+    """The Plant in a parsed file. Raises InputError where nothing drawable is left."""
+    notes = list(parsed.notes)
+    mesh = _join(parsed.parts, path)
+    mesh = _drop_broken_faces(mesh, path, notes)
+    mesh = _with_normals(mesh, notes)
+    mesh = _only_used_vertices(mesh)
+    up = options.up if options.up != "auto" else parsed.up
+    turn = UPRIGHT[up or guess_up(mesh.positions + mesh.origin, mesh.faces, notes)]
+    mesh, materials = _only_used_materials(mesh, parsed.materials)
+    plant = Plant(
+        name=parsed.name,
+        positions=(mesh.positions @ turn.T + turn @ mesh.origin) * options.metres,
+        normals=mesh.normals @ turn.T,
+        uvs=mesh.uvs,
+        colors=mesh.colors,
+        faces=mesh.faces,
+        face_material=mesh.material,
+        materials=_with_roles(materials, mesh, parsed.parts, options, path),
+        source=str(path),
+    )
+    branches = resolve_branches(plant, mesh.branch, parsed.declared, notes)
+    return replace(plant, branches=branches, notes=tuple(notes))
+
+
+def _join(parts: list[Part], path: Path) -> _Mesh:
+    """All parts in one mesh, in double precision around the middle of their bounds."""
+    sizes = np.array([len(part.positions) for part in parts])
+    counts = np.array([len(part.faces) for part in parts])
+    if counts.sum() == 0:
+        raise InputError(f"{path}: expected triangles, found none; export the plant as a mesh")
+    if counts.sum() > MAX_FACES:
+        raise InputError(
+            f"{path}: expected at most {MAX_FACES} triangles, found {counts.sum()}; read one "
+            "plant, not a landscape"
+        )
+    start = np.cumsum(sizes) - sizes
+    positions = np.concatenate([part.positions for part in parts])
+    usable = finite_vertices(positions)
+    if not usable.any():
+        raise InputError(
+            f"{path}: expected coordinates, found only NaN or infinite ones; export it again"
+        )
+    origin = 0.5 * (positions[usable].min(axis=0) + positions[usable].max(axis=0))
+    colored = any(part.colors is not None for part in parts)
+
+    def or_else(value: FloatArray | None, part: Part, width: int, fill: float) -> FloatArray:
+        return np.full((len(part.positions), width), fill) if value is None else value
+
+    points, base = [], 0
+    for part in parts:
+        point = np.arange(len(part.positions)) if part.point is None else part.point
+        points.append(point + base)
+        base += int(point.max(initial=-1)) + 1
+    return _Mesh(
+        origin=origin,
+        positions=np.where(usable[:, None], positions, np.inf) - origin,
+        normals=np.concatenate([or_else(p.normals, p, 3, 0.0) for p in parts]),
+        uvs=np.concatenate([or_else(p.uvs, p, 2, 0.0) for p in parts]),
+        colors=np.concatenate([or_else(p.colors, p, 4, 1.0) for p in parts]) if colored else None,
+        point=np.concatenate(points),
+        faces=np.concatenate([p.faces + s for p, s in zip(parts, start, strict=True)]),
+        material=np.repeat([p.material for p in parts], counts),
+        branch=np.concatenate([np.broadcast_to(p.branch, len(p.faces)) for p in parts]),
+        part=np.repeat(np.arange(len(parts)), counts),
+    )
+
+
+def _drop_broken_faces(mesh: _Mesh, path: Path, notes: list[str]) -> _Mesh:
+    """Without faces that use broken coordinates, have no area or repeat another."""
+    usable = np.isfinite(mesh.positions).all(axis=1)
+    total = len(mesh.faces)
+    bad_uvs = ~(np.abs(np.nan_to_num(mesh.uvs, nan=np.inf)) < 1e9).all(axis=1)
+    if bad_uvs.any():
+        notes.append(f"{_count(bad_uvs, 'texture coordinate')} broken (NaN or infinite), set to 0")
+    mesh = replace(
+        mesh,
+        positions=np.where(usable[:, None], mesh.positions, 0.0),
+        uvs=np.where(bad_uvs[:, None], 0.0, mesh.uvs),
+    )
+    found = {}
+    steps = (
+        ("with NaN or infinite coordinates", lambda m: ~usable[m.faces].all(axis=1)),
+        ("without area", lambda m: flat_faces(m.positions, m.faces)),
+        ("repeated", lambda m: repeated_faces(m.positions, m.uvs, m.faces, m.material)),
+    )
+    for what, broken in steps:
+        drop = broken(mesh)
+        if drop.any():
+            found[what] = int(drop.sum())
+            notes.append(f"dropped {found[what]} of {total} faces {what}")
+            mesh = _only_faces(mesh, ~drop)
+        if not len(mesh.faces):
+            listed = ", ".join(f"{n} {what}" for what, n in found.items())
+            raise InputError(
+                f"{path}: expected triangles, found none that can be drawn ({listed}); export the "
+                "model again"
+            )
+    return mesh
+
+
+def _with_normals(mesh: _Mesh, notes: list[str]) -> _Mesh:
+    """Every vertex with a unit normal: its own, else the smooth one, else its face's."""
+    own = np.where(np.isfinite(mesh.normals), mesh.normals, 0.0)
+    length = np.abs(own).max(axis=1, keepdims=True)
+    own = np.divide(own, length, out=np.zeros_like(own), where=length > SHORTEST_NORMAL)
+    own /= np.maximum(np.linalg.norm(own, axis=1, keepdims=True), 1e-30)
+    used = np.zeros(len(own), dtype=bool)
+    used[mesh.faces] = True
+    missing = used & ~own.any(axis=1)
+    if missing.any():
+        notes.append(f"computed the normals of {missing.sum()} of {used.sum()} vertices")
+        own[missing] = smooth_normals(mesh.positions, mesh.faces, mesh.point)[missing]
+        cancelled = used & ~own.any(axis=1)  # the two sides of a card that share their points
+        if cancelled.any():
+            every_vertex = np.arange(len(own))
+            last = np.zeros(len(own), dtype=np.int64)
+            last[mesh.faces] = np.arange(len(mesh.faces))[:, None]
+            lone = mesh.faces[last]
+            a, b, c = (mesh.positions[lone[:, k]] for k in range(3))
+            flat = np.cross(b - a, c - a)[every_vertex]
+            own[cancelled] = (flat / np.linalg.norm(flat, axis=1, keepdims=True).clip(1e-30))[
+                cancelled
+            ]
+    return replace(mesh, normals=own)
+
+
+def _only_faces(mesh: _Mesh, keep: np.ndarray) -> _Mesh:
+    return replace(
+        mesh,
+        faces=mesh.faces[keep],
+        material=mesh.material[keep],
+        branch=mesh.branch[keep],
+        part=mesh.part[keep],
+    )
+
+
+def _only_used_vertices(mesh: _Mesh) -> _Mesh:
+    used = np.zeros(len(mesh.positions), dtype=bool)
+    used[mesh.faces] = True
+    return replace(
+        mesh,
+        positions=mesh.positions[used],
+        normals=mesh.normals[used],
+        uvs=mesh.uvs[used],
+        colors=None if mesh.colors is None else mesh.colors[used],
+        point=mesh.point[used],
+        faces=(np.cumsum(used) - 1)[mesh.faces],
+    )
+
+
+def _only_used_materials(mesh: _Mesh, materials: list[Material]) -> tuple[_Mesh, list[Material]]:
+    used = np.unique(mesh.material)
+    return replace(mesh, material=np.searchsorted(used, mesh.material)), [
+        materials[k] for k in used
+    ]
+
+
+def _with_roles(
+    materials: list[Material], mesh: _Mesh, parts: list[Part], options: ReadOptions, path: Path
+) -> tuple[Material, ...]:
+    """The materials with their roles: as the user says, else guessed."""
+    if options.leaf_materials:
+        roles = named_roles(materials, options.leaf_materials, str(path))
+    else:
+        roles = [
+            guess_role(material, *_worn(mesh, parts, index))
+            for index, material in enumerate(materials)
+        ]
+    return tuple(replace(m, role=r) for m, r in zip(materials, roles, strict=True))
+
+
+def _worn(mesh: _Mesh, parts: list[Part], material: int) -> tuple[set[str], float]:
+    """Names of the parts that wear a material, and its faces per distinct point."""
+    worn = mesh.material == material
+    names = {parts[k].name for k in np.unique(mesh.part[worn])}
+    vertices = np.unique(mesh.faces[worn])
+    return names, worn.sum() / len(np.unique(mesh.positions[vertices] @ _SPREAD))
+
+
+_SPREAD = np.array([1.0, np.sqrt(2.0), np.pi])
+"""Tells points apart by one number each."""
+
+
+def _count(mask: np.ndarray, what: str) -> str:
+    count = int(mask.sum())
+    return f"{count} {what}{'s' if count != 1 else ''}"

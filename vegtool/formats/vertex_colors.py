@@ -1,0 +1,56 @@
+"""Vertex colours: a factor on the material, or a mask for wind in disguise.
+
+glTF multiplies COLOR_0 into the base colour. Exporters also store weights for wind shaders there,
+which would paint a plant red, green and black.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vegtool.arrays import FloatArray
+
+BLACK = 1.5 / 255
+"""A channel never above this is empty."""
+WHITE = 254.5 / 255
+"""Colours never below this change nothing."""
+UNALIKE = 0.5
+"""Mean difference between the largest and the smallest channel over the largest: natural tints lie
+well below on textured plants, weights for wind above."""
+
+
+def settle_colors(
+    colors: FloatArray, textured: bool, what: str, notes: list[str]
+) -> FloatArray | None:
+    """(v, 4) linear factors, or None where they change nothing or are no colours.
+
+    colors: (v, 3) or (v, 4). textured: whether the material has a texture to be tinted.
+    """
+    if not len(colors):
+        return None
+    if colors.shape[1] == 3:
+        colors = np.concatenate([colors, np.ones((len(colors), 1))], axis=1)
+    colors = np.clip(np.nan_to_num(np.asarray(colors, dtype=np.float64), nan=1.0), 0.0, 1.0)
+    if colors.min() >= WHITE:
+        return None
+    rgb = colors[:, :3]
+    highest = rgb.max(axis=0)
+    if highest.max() <= BLACK:
+        notes.append(f"{what}: vertex colours are all black; ignored")
+        return None
+    if textured and _looks_like_weights(rgb):
+        notes.append(
+            f"{what}: vertex colours look like weights for wind, not colours; ignored"
+        )
+        return None
+    return colors
+
+
+def _looks_like_weights(rgb: FloatArray) -> bool:
+    """Pure channels, or channels that have nothing to do with one another."""
+    if (rgb.max(axis=0) <= BLACK).any():
+        return True
+    largest = rgb.max(axis=1)
+    lit = largest > BLACK
+    unlike = (largest[lit] - rgb.min(axis=1)[lit]) / largest[lit]
+    return bool(unlike.mean() > UNALIKE)
