@@ -7,8 +7,8 @@ import numpy as np
 from vegtool.arrays import FloatArray, IntArray
 from vegtool.growth.mesh import Piece, grid_faces, pile
 from vegtool.growth.species import Foliage
-from vegtool.growth.stems import UP, Stems, aim, across, envelope_at, lay_out, level_side
-from vegtool.growth.textures import CELLS, CELL_MARGIN
+from vegtool.growth.stems import UP, Stems, across, aim, envelope_at, lay_out, level_side
+from vegtool.growth.textures import CELL_MARGIN, CELLS
 
 LARGEST = 4.0  # times its reference size: at a very low detail a crown is allowed to thin out
 
