@@ -6,25 +6,25 @@ supersampled without mips, averages are taken in linear light, alpha is coverage
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from math import sqrt
 from time import perf_counter
-from typing import Literal
 
 import numpy as np
 
-from vegtool.arrays import FloatArray, IntArray
+from vegtool.arrays import ByteArray, FloatArray, IntArray
 from vegtool.baking.dilate import nearest_covered
+from vegtool.baking.options import BakeOptions
 from vegtool.baking.pack import Packing, pack
+from vegtool.baking.sides import compare_sides, opposite_needed, pictures_of, turned
 from vegtool.errors import UsageError
-from vegtool.gl.pictures import Drawn, Pictures, draw_pictures
+from vegtool.gl.pictures import Drawn, draw_pictures
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Atlas, Billboards
 from vegtool.plant import Plant
 from vegtool.progress import Progress, silent
-
-Sides = Literal["auto", "double", "opposite"]
 
 MOST_SAMPLES = 8
 """Samples per axis that small atlases are raised to; alpha then has 64 steps."""
@@ -32,27 +32,12 @@ CHEAP_SAMPLES = 2_000_000
 """Samples of an atlas up to which more of them per texel cost little."""
 
 
-@dataclass(frozen=True)
-class BakeOptions:
-    """How a level is baked.
-
-    supersample: samples per axis and texel; small atlases take up to 8, where it costs little.
-    gutter: texels around each picture; two on each side keep neighbours apart for two mips.
-    max_texture: texels, the longest side of an atlas; the density is lowered to fit.
-    sides: one picture per billboard for both sides ("double"), one for each ("opposite"), or
-    whichever the plant needs ("auto", by measuring how much front and back differ).
-    """
-
-    supersample: int = 4
-    gutter: int = 2
-    max_texture: int = 2048
-    sides: Sides = "auto"
-
-
 @dataclass(frozen=True, eq=False)
 class Baked:
     """A level's textures.
 
+    billboards: the rectangles given; some turned round (u and the normal), so that the side which
+    shows more is in front. double_sided: as in Level.
     texels_per_metre: the density used, lower than asked for where max_texture forbade it.
     fill: share of the atlas taken by pictures and their gutters. seconds: by stage.
     """
@@ -87,34 +72,49 @@ def bake(
             return bake(buffers, labels, billboards, texels_per_metre, options, progress)
     seconds: dict[str, float] = {}
     progress("bake", 0.0)
-    started = perf_counter()
-    face, shown_by = pairs(labels, billboards.cluster)
-    seconds["pairs"] = perf_counter() - started
+    with _timed(seconds, "pairs"):
+        face, shown_by = pairs(labels, billboards.cluster)
+    with _timed(seconds, "sides"):
+        sides = compare_sides(plant, billboards, face, shown_by)
+        billboards, sides = turned(billboards, sides)
+        double_sided = options.sides == "double" or (
+            options.sides == "auto" and not opposite_needed(billboards, sides)
+        )
+        behind = np.flatnonzero(sides.differ & (not double_sided)).astype(np.int32)
+    progress("bake", 0.2)
+    with _timed(seconds, "pack"):
+        half_size = np.concatenate([billboards.half_size, billboards.half_size[behind]])
+        half_size[len(billboards) :][sides.back[behind] == 0] = 0  # nothing there: one texel
+        packing, density = fit(half_size, texels_per_metre, options)
+        samples = supersample(packing, options)
 
-    started = perf_counter()
-    packing, density = fit(billboards.half_size, texels_per_metre, options)
-    seconds["pack"] = perf_counter() - started
-
-    samples = supersample(packing, options)
-    pictures = Pictures(
-        billboards.center,
-        billboards.u,
-        billboards.v,
-        billboards.half_size,
-        billboards.half_depth,
-        np.ones(len(billboards), dtype=np.int32),
-        packing.rect,
+    which = np.concatenate([np.arange(len(billboards)), behind])
+    side = np.where(np.arange(len(which)) < len(billboards), 1, -1)
+    back_face, back_picture = _pairs_behind(face, shown_by, behind, len(billboards))
+    drawn = draw_pictures(
+        plant,
+        pictures_of(billboards, which, side, packing.rect),
+        np.concatenate([face, back_face]),
+        np.concatenate([shown_by, back_picture]),
+        (packing.width, packing.height),
+        samples,
     )
-    size = (packing.width, packing.height)
-    drawn = draw_pictures(plant, pictures, face, shown_by, size, samples)
     seconds |= drawn.seconds
     progress("bake", 0.8)
-
-    started = perf_counter()
-    atlas = dilated(drawn, packing)
-    seconds["dilate"] = perf_counter() - started
+    with _timed(seconds, "dilate"):
+        front = packing.rect[: len(billboards)]
+        back = front.copy()
+        back[behind] = packing.rect[len(billboards) :]
+        atlas = Atlas(*dilated(drawn, packing), drawn.depth, front, back)
     progress("bake", 1.0)
-    return Baked(billboards, atlas, True, density, samples, packing.fill, seconds)
+    return Baked(billboards, atlas, double_sided, density, samples, packing.fill, seconds)
+
+
+@contextmanager
+def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
+    started = perf_counter()
+    yield
+    seconds[stage] = perf_counter() - started
 
 
 def pairs(labels: IntArray, cluster: IntArray) -> tuple[IntArray, IntArray]:
@@ -127,6 +127,17 @@ def pairs(labels: IntArray, cluster: IntArray) -> tuple[IntArray, IntArray]:
     face = np.repeat(np.arange(len(labels), dtype=np.int32), times)
     nth = np.arange(len(face)) - np.repeat(np.cumsum(times) - times, times)
     return face, order[np.repeat(first[labels], times) + nth]
+
+
+def _pairs_behind(
+    face: IntArray, shown_by: IntArray, behind: IntArray, first: int
+) -> tuple[IntArray, IntArray]:
+    """The pairs of the billboards `behind` once more, for pictures numbered from `first` on."""
+    number = np.full(int(shown_by.max(initial=-1)) + 1, -1, dtype=np.int32)
+    behind = behind[behind < len(number)]
+    number[behind] = first + np.arange(len(behind))
+    keep = number[shown_by] >= 0
+    return face[keep], number[shown_by[keep]]
 
 
 def fit(
@@ -158,11 +169,10 @@ def supersample(packing: Packing, options: BakeOptions) -> int:
     return max(options.supersample, min(MOST_SAMPLES, cheap))
 
 
-def dilated(drawn: Drawn, packing: Packing) -> Atlas:
-    """The atlas with colour and normals carried under alpha 0; alpha and depth as they are."""
+def dilated(drawn: Drawn, packing: Packing) -> tuple[ByteArray, ByteArray]:
+    """Colour and normals carried under alpha 0; alpha stays as it is."""
     covered = drawn.color[..., 3] > 0
     nearest = nearest_covered(covered, packing.rect, packing.gutter)
     color = drawn.color.reshape(-1, 4)[nearest]
     color[..., 3] = drawn.color[..., 3]
-    normal = drawn.normal.reshape(-1, 3)[nearest]
-    return Atlas(color, normal, drawn.depth, packing.rect, packing.rect)
+    return color, drawn.normal.reshape(-1, 3)[nearest]

@@ -51,7 +51,7 @@ def pack(sizes: IntArray, gutter: int, max_side: int) -> Packing:
     Never wider than `max_side` unless a single rectangle is; the height is what it takes: the
     caller checks `Packing.height` against its limit. The same sizes give the same packing.
     """
-    grown = np.asarray(sizes, dtype=np.int64) + 2 * gutter
+    grown = np.asarray(sizes, dtype=np.int32) + 2 * gutter
     order = np.lexsort((np.arange(len(grown)), -grown[:, 0], -grown[:, 1]))
     best: tuple[tuple[int, int], IntArray, int, int] | None = None
     for width in _widths(grown, max_side):
@@ -69,7 +69,7 @@ def pack(sizes: IntArray, gutter: int, max_side: int) -> Packing:
 
 def _widths(grown: IntArray, max_side: int) -> list[int]:
     """Widths to try: around the square that the rectangles would fill to nine tenths."""
-    area = float(grown.prod(axis=1).sum()) / 0.9
+    area = float(grown.astype(np.float64).prod(axis=1).sum()) / 0.9
     tries = int(np.clip(TRIES // max(1, len(grown)), 1, MAX_WIDTHS))
     factors = np.linspace(1 / sqrt(ASPECT), sqrt(ASPECT), tries) if tries > 1 else np.ones(1)
     least, most = _blocks(int(grown[:, 0].max())), max_side - max_side % BLOCK
