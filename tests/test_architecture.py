@@ -18,7 +18,7 @@ GROUND = {"errors", "arrays", "options", "progress", "seeding", "plant", "lod", 
 MAY_IMPORT: dict[str, set[str]] = {
     "formats": set(),
     "growth": set(),
-    "branches": set(),
+    "branches": {"formats"},
     "clustering": {"branches"},
     "boxes": set(),
     "gl": set(),

@@ -2,9 +2,9 @@
 
 Nearest is by the gap between the start of the axis and the other's surface, in start radii; inside
 another tube, where the gap is nought, by how deep: generators start a branch on its parent's axis.
-Being thicker only weighs in, for generators do make branches thicker than their parents. The
-cheapest joins are made first and none may close a circle. A tube that starts far from all wood, or
-at another's foot, is a trunk.
+Being thicker only weighs in, for generators do make branches thicker than their parents. Two tubes
+that start side by side are rather children of a third, or both trunks. The cheapest joins are made
+first and none may close a circle. A tube that starts far from all wood is a trunk.
 """
 
 from __future__ import annotations
@@ -21,7 +21,10 @@ HOSTS = 8  # of which so many tubes are kept
 REACH = 3.0  # start radii: wider gaps are bridged only within REACH_FRACTION
 REACH_FRACTION = 0.05  # of the plant's radius
 THIN = 0.25  # what a host counts that is thinner than the branch by all of its radius
-FOOT = 1e-6  # of the plant's radius: a start no farther along another tube is at its foot
+BESIDE = 0.5  # what it counts to start beside the host's own start, within its radius
+ON_AXIS = 1e-4  # of the host's radius: so near its axis that no chance has put it there, and
+# neither of those two counts
+AT_START = 1e-6  # of the plant's radius: no tube grows from the very start of another
 
 
 def join_tubes(rings: Skeleton, tubes: Tubes, axes: Axes) -> np.ndarray:
@@ -30,9 +33,11 @@ def join_tubes(rings: Skeleton, tubes: Tubes, axes: Axes) -> np.ndarray:
     orphans = np.flatnonzero(tubes.fork < 0)
     if len(orphans) < 2:
         return parent
-    child, host, cost = _offers(rings, tubes, axes, orphans)
-    root = root_tubes(parent)
-    return _cheapest_forest(parent, root, child, host, cost)
+    child, host, cost, beside = _offers(rings, tubes, axes, orphans)
+    joined = _cheapest_forest(parent, root_tubes(parent), child, host, cost)
+    fellow = np.zeros(len(tubes), dtype=bool)  # stands beside the foot of a trunk
+    fellow[child[beside & (joined[child] == host) & (joined[host] < 0)]] = True
+    return np.where(fellow, -1, joined)
 
 
 def root_tubes(parent: np.ndarray) -> np.ndarray:
@@ -47,8 +52,9 @@ def root_tubes(parent: np.ndarray) -> np.ndarray:
 
 def _offers(
     rings: Skeleton, tubes: Tubes, axes: Axes, orphans: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, FloatArray]:
-    """Possible joins, three arrays (o,): child, host and cost; at most HOSTS for each child."""
+) -> tuple[np.ndarray, np.ndarray, FloatArray, np.ndarray]:
+    """Possible joins, four arrays (o,): child, host, cost and whether they start side by side; at
+    most HOSTS for each child."""
     start = rings.center[tubes.start[orphans]]
     radius = np.maximum(rings.radius[tubes.start[orphans]], np.finfo(float).eps)[:, None]
     segment = _near_segments(start, axes)
@@ -56,12 +62,15 @@ def _offers(
     host = axes.tube[segment]
     gap = np.maximum(distance - thickness, 0)
     depth = np.minimum(distance / np.maximum(thickness, np.finfo(float).eps), 1)
-    thin = THIN * np.maximum(1 - thickness / radius, 0)
-    foot = (along <= FOOT) & (tubes.fork[host] < 0)
-    allowed = ~foot & (gap <= np.maximum(REACH * radius, REACH_FRACTION))
+    off_axis = depth > ON_AXIS
+    thin = THIN * np.maximum(1 - thickness / radius, 0) * off_axis
+    beside = (along < thickness) & off_axis
+    allowed = (along > AT_START) | (beside & (depth < 1))
+    allowed &= gap <= np.maximum(REACH * radius, REACH_FRACTION)
     row, column = np.nonzero(allowed)
     child, host = orphans[row], host[row, column]
-    cost = (gap / radius + depth + thin)[row, column]
+    cost = (gap / radius + depth + thin + BESIDE * beside)[row, column]
+    beside = beside[row, column]
 
     order = np.lexsort((cost, host, child))  # the cheapest of each pair
     order = order[_firsts(child[order] * len(tubes) + host[order])]
@@ -70,7 +79,7 @@ def _offers(
     place = np.arange(len(order))
     nth = place - np.repeat(place[first], np.diff(np.append(place[first], len(order))))
     order = order[nth < HOSTS]
-    return child[order], host[order], cost[order]
+    return child[order], host[order], cost[order], beside[order]
 
 
 def _firsts(labels: np.ndarray) -> np.ndarray:

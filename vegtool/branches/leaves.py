@@ -1,8 +1,10 @@
 """Hangs every leaf part on the tube that carries it.
 
-A leaf's anchor is the midpoint of one of its edges, the one at which the card is attached: of all
-of them, the one nearest to wood. A leaf part too large for one branch (a crown modelled as one
-blob) goes face by face.
+A leaf's anchor is the midpoint of one of its edges, the one at which the card is attached. A
+generator makes all leaves alike, so it is the same edge in all of them, counted as the file shows
+it: the one that is nearest to wood in most. Where several share that (the file's order is lost, or
+leaves differ), each leaf takes the nearest of these. A leaf part too large for one branch (a crown
+modelled as one blob) goes face by face.
 """
 
 from __future__ import annotations
@@ -16,6 +18,8 @@ from vegtool.branches.parts import Parts
 NEIGHBOURS = 3  # axis samples looked at for each anchor
 BLOB = 0.3  # of the plant's radius: a leaf part whose radius is larger goes face by face
 DEPTH = 0.1  # inside wood, a tenth of the distance to the axis counts
+OFTEN = 0.5  # of the most frequent one: edges nearest to wood so often may be the attached one
+MOST_SLOTS = 64  # edges of one leaf: larger leaf parts have no such order
 
 
 def hang_leaves(parts: Parts, axes: Axes) -> np.ndarray:
@@ -24,11 +28,30 @@ def hang_leaves(parts: Parts, axes: Axes) -> np.ndarray:
     corners = parts.positions[parts.faces]
     anchors = (corners + np.roll(corners, -1, axis=1)).reshape(-1, 3) / 2
     tube, cost = nearest_tubes(anchors, axes)
-    count = int(owner.max()) + 1
     of = np.repeat(owner, 3)
+    cost = np.where(_attached(owner, cost), cost, np.inf)
     order = np.lexsort((cost, of))
-    best = order[np.searchsorted(of[order], np.arange(count))]
+    best = order[np.searchsorted(of[order], np.arange(int(owner.max()) + 1))]
     return np.asarray(tube[best][owner])
+
+
+def _attached(owner: np.ndarray, cost: FloatArray) -> np.ndarray:
+    """(3f,) bool: edges that may be the attached one, by leaves of one number of faces."""
+    order = np.argsort(owner, kind="stable")
+    size = np.bincount(owner)
+    nth = np.empty(len(owner), dtype=np.int64)
+    nth[order] = np.arange(len(owner)) - np.repeat(np.cumsum(size) - size, size)
+    slot = (3 * nth[:, None] + np.arange(3)).ravel()
+    of = np.repeat(owner, 3)
+    may = np.ones(len(cost), dtype=bool)
+    for faces in np.unique(size[size <= MOST_SLOTS // 3]):
+        rows = np.flatnonzero(size[of] == faces)
+        table = np.empty((int((size == faces).sum()), 3 * faces))
+        leaf = np.unique(of[rows], return_inverse=True)[1]
+        table[leaf, slot[rows]] = cost[rows]
+        wins = np.bincount(table.argmin(axis=1), minlength=3 * faces)
+        may[rows] = (wins >= OFTEN * wins.max())[slot[rows]]
+    return may
 
 
 def nearest_tubes(points: FloatArray, axes: Axes) -> tuple[np.ndarray, FloatArray]:
