@@ -158,7 +158,7 @@ def _image(file: GltfFile, index: int, notes: list[str]) -> Texture | None:
     else:
         data = file.resource(uri, f"images[{index}]")
     if data is None:
-        notes.append(f"texture {short} is missing; its material is drawn in its plain colour")
+        notes.append(f"texture {short} is missing; drawn without it")
         return None
     return decode(data, name, f"{file.path}: image {name}")
 
