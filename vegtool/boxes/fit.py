@@ -11,21 +11,26 @@ out is measured on all points.
 
 from __future__ import annotations
 
-from itertools import product
+from itertools import combinations_with_replacement, product
 
 import numpy as np
+import numpy.typing as npt
 
 from vegtool.arrays import FloatArray, IntArray
 from vegtool.boxes.box import MIN_EXTENT, Boxes
 from vegtool.boxes.groups import Groups
 from vegtool.boxes.options import BoxOptions
 
-DIRECTIONS = 64
-"""Directions in which the extreme points are sought, at both ends."""
+BLOCK = 1024
+"""Points whose extremes are sought together: their products stay in the processor's cache."""
 LEAST_SPREAD = 1e-6
 """Standard deviation, as a fraction of the largest, below which a cluster counts as flat there."""
 TURNS_PER_STEP = 12
 """Turns taken at most at one angle before going on to the next finer one."""
+SHARP = 0.02
+"""Fraction of a box's shortest side that the last, halved step may still change it by."""
+HALVINGS = 12
+"""Times the finest step is halved at most: enough for the flattest box that the floor allows."""
 BATCH = 32
 """Clusters searched together: their products stay in the processor's cache."""
 STARTS = 3
@@ -65,22 +70,31 @@ def fit_boxes(
 
 
 def centred(points: FloatArray, groups: Groups) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Origin (g, 3) and scale (g,) of each group, and its points about the mean within radius 1."""
-    first = points[groups.order[groups.starts[:-1]]]
-    local = points[groups.order] - groups.spread(first)  # before summing: keeps all digits
-    mean = groups.sum(local) / np.diff(groups.starts)[:, None]
-    local -= groups.spread(mean)
-    scale = np.sqrt(groups.greatest(np.einsum("ni,ni->n", local, local)))
+    """Origin (g, 3) and scale (g,) of each group, and its points (3, n) about the mean, within 1.
+
+    Coordinates lie in three rows, in which the sums of a million points stay fast.
+    """
+    origin = points[groups.order[groups.starts[:-1]]]
+    count = np.diff(groups.starts)
+    local = np.empty((3, len(points)))
+    for axis, row in enumerate(local):
+        np.take(points[:, axis], groups.order, out=row)
+        row -= groups.spread(origin[:, axis])  # before summing: keeps all digits
+        mean = groups.sum(row) / count
+        row -= groups.spread(mean)
+        origin[:, axis] += mean
+    scale = np.sqrt(groups.greatest(local[0] ** 2 + local[1] ** 2 + local[2] ** 2))
     scale[scale == 0] = 1.0
-    local /= groups.spread(scale)[:, None]
-    return first + mean, scale, local
+    local *= groups.spread(1 / scale)
+    return origin, scale, local
 
 
 def principal_axes(local: FloatArray, groups: Groups) -> tuple[FloatArray, FloatArray]:
     """Rows (g, 3, 3) of rotations to the principal axes, and the standard deviations (g, 3)."""
-    outer = local[:, :, None] * local[:, None, :]
-    scatter = groups.sum(outer) / np.diff(groups.starts)[:, None, None]
-    values, vectors = np.linalg.eigh(scatter)
+    scatter = np.empty((len(groups), 3, 3))
+    for i, j in combinations_with_replacement(range(3), 2):
+        scatter[:, i, j] = scatter[:, j, i] = groups.sum(local[i] * local[j])
+    values, vectors = np.linalg.eigh(scatter / np.diff(groups.starts)[:, None, None])
     axes = np.swapaxes(vectors, 1, 2)[:, ::-1].copy()
     axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
     return axes, np.sqrt(np.maximum(values[:, ::-1], 0.0))
@@ -90,18 +104,30 @@ def support_points(
     local: FloatArray, groups: Groups, frames: FloatArray, spread: FloatArray
 ) -> list[FloatArray]:
     """Points (m, 3), in the principal frame, that are extreme in some direction, per group."""
-    directions = even_directions(DIRECTIONS)
     widest = np.where(spread[:, :1] > 0, spread[:, :1], 1.0)
     stretch = 1 / np.maximum(spread, LEAST_SPREAD * widest)
-    towards = np.einsum("di,gi,gij->gdj", directions, stretch, frames)
     found = []
-    for part, frame, toward in zip(groups.slices(), frames, towards, strict=True):
-        points = local[part]
-        if len(points) > 2 * DIRECTIONS:
-            along = np.einsum("dj,nj->dn", toward, points)
-            points = points[np.unique([along.argmax(axis=1), along.argmin(axis=1)])]
-        found.append(np.einsum("nj,ij->ni", points, frame))
+    for part, frame, scale in zip(groups.slices(), frames, stretch, strict=True):
+        points = np.einsum("ij,jn->in", frame, local[:, part])
+        rows = extreme_rows((points * scale[:, None]).astype(np.float32))
+        found.append(points[:, rows].T)
     return found
+
+
+def extreme_rows(points: npt.NDArray[np.float32]) -> npt.NDArray[np.intp]:
+    """Which of the points (3, n) are the farthest one way or the other along a direction.
+
+    First the extreme ones of each block, then those of what is left, until one block holds all.
+    """
+    rows = np.arange(points.shape[1])
+    while True:
+        blocks = -(-len(rows) // BLOCK)
+        padded = np.resize(rows, (blocks, -(-len(rows) // blocks)))
+        along = DIRECTIONS @ np.swapaxes(points[:, padded], 0, 1)  # (blocks, directions, points)
+        ends = np.concatenate([along.argmax(axis=2), along.argmin(axis=2)], axis=1)
+        rows = np.unique(np.take_along_axis(padded, ends, axis=1))
+        if blocks == 1:
+            return rows
 
 
 def even_directions(count: int) -> FloatArray:
@@ -118,37 +144,45 @@ def search(support: list[FloatArray], steps_deg: tuple[float, ...]) -> FloatArra
     width = max(len(s) for s in support)
     points = np.stack([np.concatenate([s, np.repeat(s[:1], width - len(s), 0)]) for s in support])
     grid = START_GRID
-    volumes = box_volumes(np.tile(grid, (len(points), 1, 1, 1)), points)
+    volumes = box_sides(np.broadcast_to(grid, (len(points), *grid.shape)), points).prod(axis=2)
     volumes[:, 0] = -1.0  # the principal axes are always one of the starts
     best = np.argsort(volumes, axis=1, kind="stable")[:, :STARTS]
     rotation = grid[best].reshape(-1, 3, 3)
     points = np.repeat(points, STARTS, axis=0)
-    least = box_volumes(rotation[:, None], points)[:, 0]
-    for degrees in steps_deg:
-        turns = rotations(NEIGHBOURS * np.radians(degrees))
+    sides = box_sides(rotation[:, None], points)[:, 0]
+    for degrees in (*steps_deg, *(steps_deg[-1] / 2**n for n in range(1, HALVINGS + 1))):
         active = np.arange(len(points))
+        if degrees < steps_deg[-1]:
+            active = np.flatnonzero(sides.max(1) * np.radians(degrees) > SHARP / 2 * sides.min(1))
+        turns = rotations(NEIGHBOURS * np.radians(degrees))
         for _ in range(TURNS_PER_STEP):
-            tried = turns @ rotation[active, None]
-            volumes = box_volumes(tried, points[active])
-            best = volumes.argmin(axis=1)
-            smallest = volumes[np.arange(len(active)), best]
-            better = smallest < least[active] * (1 - 1e-9)
-            rows = active[better]
-            rotation[rows] = tried[better, best[better]]
-            least[rows] = smallest[better]
-            active = rows
             if not len(active):
                 break
-    winner = least.reshape(-1, STARTS).argmin(axis=1)
+            tried = turns @ rotation[active, None]
+            found = box_sides(tried, points[active])
+            volumes = found.prod(axis=2)
+            best = volumes.argmin(axis=1)
+            row = np.arange(len(active))
+            better = volumes[row, best] < sides[active].prod(axis=1) * (1 - 1e-9)
+            rows = active[better]
+            rotation[rows] = tried[better, best[better]]
+            sides[rows] = found[better, best[better]]
+            active = rows
+    winner = sides.prod(axis=1).reshape(-1, STARTS).argmin(axis=1)
     return np.asarray(rotation.reshape(-1, STARTS, 3, 3)[np.arange(len(winner)), winner])
 
 
-def box_volumes(rotation: FloatArray, points: FloatArray) -> FloatArray:
-    """(g, r) volumes of the boxes along rotations (g, r, 3, 3) around points (g, m, 3)."""
+def box_sides(rotation: FloatArray, points: FloatArray) -> FloatArray:
+    """(g, r, 3) sides of the boxes along rotations (g, r, 3, 3) around points (g, m, 3).
+
+    A side below the floor counts as the floor and a hundredth of itself, so that flat clusters,
+    whose volume the floor decides, keep to their plane.
+    """
     g, r = rotation.shape[:2]
-    along = rotation.reshape(g, 3 * r, 3) @ np.swapaxes(points, 1, 2)
-    extent = along.max(axis=2) - along.min(axis=2)
-    return np.asarray(np.maximum(extent, 2 * MIN_EXTENT).reshape(g, r, 3).prod(axis=2))
+    along = points @ np.swapaxes(rotation.reshape(g, 3 * r, 3), 1, 2)
+    extent = (along.max(axis=1) - along.min(axis=1)).reshape(g, r, 3)
+    floor = 2 * MIN_EXTENT  # points lie within a radius of 1
+    return np.asarray(np.maximum(extent, floor) + 0.01 * np.minimum(extent, floor))
 
 
 def rotations(vectors: FloatArray) -> FloatArray:
@@ -164,7 +198,7 @@ def extents(local: FloatArray, groups: Groups, axes: FloatArray) -> tuple[FloatA
     """Least and greatest coordinate (g, 3) of each group's points along its axes."""
     low, high = np.empty((len(groups), 3)), np.empty((len(groups), 3))
     for i, part in enumerate(groups.slices()):
-        along = np.einsum("ij,nj->in", axes[i], local[part])
+        along = np.einsum("ij,jn->in", axes[i], local[:, part])
         low[i], high[i] = along.min(axis=1), along.max(axis=1)
     return low, high
 
@@ -185,3 +219,5 @@ NEIGHBOURS = np.array([n for n in product((-1.0, 0.0, 1.0), repeat=3) if any(n)]
 _angles = np.radians([0.0, -22.5, 22.5, -45.0, 45.0])
 START_GRID = rotations(np.array(list(product(_angles, repeat=3))))
 """(125, 3, 3) rotations about the principal axes; the first one is none."""
+DIRECTIONS = even_directions(64).astype(np.float32)
+"""(64, 3) directions in which the extreme points are sought, at both ends."""

@@ -46,6 +46,8 @@ def outer_points(points: FloatArray) -> FloatArray:
         points[:, 0] - polygon[:, :1]
     )
     real = np.abs(edge).max(axis=1) > 0
+    if not real.any():
+        return points[:1]  # all are the same point
     outside = ~(side[real] > 0).all(axis=0)
     return np.asarray(points[outside])
 
