@@ -23,7 +23,7 @@ from vegtool.formats.gltf import (
     write_chain,
 )
 from vegtool.lod import Level, billboard_quads
-from vegtool.plant import Texture
+from vegtool.plant import Branches, Texture
 
 
 def test_a_plant_is_one_node_with_one_primitive_for_each_material_in_use():
@@ -118,6 +118,30 @@ def test_vertex_colours_are_normalised_shorts():
 def test_a_plant_without_texture_coordinates_stores_none():
     plant = leafy_plant(uvs=np.zeros((8, 2)))
     assert "TEXCOORD_0" not in parse(plant_glb(plant)).primitive(0, 1)
+
+
+def test_branches_are_written_for_each_vertex_and_split_where_they_meet():
+    # The bark square's two triangles lie on different branches and share an edge (vertices 0, 2).
+    branches = Branches(
+        np.array([0, 1, 1, 2]), np.array([-1, 0, 1]), np.array([0, 1, 2]), "generator"
+    )
+    plant = leafy_plant(branches=branches)
+    glb = parse(plant_glb(plant))
+    for part in (0, 1):
+        stored = glb.primitive(0, part)
+        corner_branch = stored["_BRANCH"][stored["indices"]].reshape(-1, 3)
+        expected = branches.face_branch[2 * part : 2 * part + 2]
+        assert np.array_equal(corner_branch, np.repeat(expected[:, None], 3, axis=1))
+        corner_parent = stored["_BRANCH_PARENT"][stored["indices"]].reshape(-1, 3)
+        assert np.array_equal(corner_parent[:, 0], branches.parent[expected])
+        corners = stored["POSITION"][stored["indices"]].reshape(-1, 3, 3)
+        assert np.array_equal(corners, plant.corners[2 * part : 2 * part + 2])
+
+
+def test_the_original_in_a_chain_carries_no_branches():
+    branches = Branches(np.zeros(4, int), np.array([-1]), np.array([0]), "generator")
+    chain = small_chain(levels=(Level("mesh", mesh=leafy_plant(branches=branches)),))
+    assert "_BRANCH" not in parse(chain_glb(chain)).primitive()
 
 
 def test_zero_normals_become_unit_vectors():

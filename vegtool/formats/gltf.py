@@ -23,7 +23,7 @@ from vegtool.formats.glb import ELEMENT_ARRAY_BUFFER, Document
 from vegtool.formats.manifest import LevelFile, encode, manifest, screen_height_fraction
 from vegtool.formats.tangents import tangents
 from vegtool.lod import Level, LodChain, billboard_quads
-from vegtool.plant import Material, Plant, Texture
+from vegtool.plant import Branches, Material, Plant, Texture
 
 ALPHA_CUTOFF = 0.5  # of a billboard: alpha is coverage, half covered is drawn
 ROUGHNESS = 0.9  # of a billboard: foliage seen from afar has no highlight of its own
@@ -38,9 +38,13 @@ EncodedImages = dict[int, tuple[bytes, str]]
 
 
 def plant_glb(plant: Plant) -> bytes:
-    """A plant as a .glb file: one node, one mesh, one primitive per material that has faces."""
+    """A plant as a .glb file: one node, one mesh, one primitive per material that has faces.
+
+    Where the plant knows its branches, vertices carry the attributes _BRANCH and _BRANCH_PARENT
+    (indices of branches, -1 for no parent), which vegtool reads back.
+    """
     writer = _Writer(_local_origin(plant.bounds), {})
-    writer.document.show(writer.add_plant(plant, plant.name))
+    writer.document.show(writer.add_plant(plant, plant.name, plant.branches))
     return writer.document.glb()
 
 
@@ -160,10 +164,10 @@ class _Writer:
             return self.add_plant(level.mesh, name)
         return self.add_billboards(level, name)
 
-    def add_plant(self, plant: Plant, name: str) -> int:
-        """Add a plant; return its node."""
+    def add_plant(self, plant: Plant, name: str, branches: Branches | None = None) -> int:
+        """Add a plant, with the branch of each vertex if `branches` are given; return its node."""
         used = np.unique(plant.face_material).tolist()
-        return self._add_node(name, [self._add_part(plant, index) for index in used])
+        return self._add_node(name, [self._add_part(plant, index, branches) for index in used])
 
     def add_billboards(self, level: Level, name: str) -> int:
         """Add a billboard level; return its node."""
@@ -186,18 +190,27 @@ class _Writer:
         moved = {"translation": self._origin.tolist()} if self._origin.any() else {}
         return self.document.add("nodes", name=name, mesh=mesh, **moved)
 
-    def _add_part(self, plant: Plant, index: int) -> dict[str, Any]:
+    def _add_part(self, plant: Plant, index: int, branches: Branches | None) -> dict[str, Any]:
         """The faces of one material as a primitive with vertices of its own."""
-        material = plant.materials[index]
-        vertices, faces = _compact(plant.faces[plant.face_material == index], len(plant.positions))
-        positions, normals = plant.positions[vertices], _unit_normals(plant.normals[vertices])
+        material, chosen = plant.materials[index], plant.face_material == index
+        faces = plant.faces[chosen]
+        if branches is None:
+            vertices, faces = _compact(faces, len(plant.positions))
+            owner = None
+        else:
+            vertices, faces, owner = _split_by_group(faces, branches.face_branch[chosen])
         frames = None
         if material.normal_texture is not None:
-            frames, origin, faces = tangents(positions, normals, plant.uvs[vertices], faces)
-            positions, normals, vertices = positions[origin], normals[origin], vertices[origin]
+            frames, origin, faces = tangents(
+                plant.positions[vertices],
+                _unit_normals(plant.normals[vertices]),
+                plant.uvs[vertices],
+                faces,
+            )
+            vertices, owner = vertices[origin], None if owner is None else owner[origin]
         attributes = {
-            "POSITION": self._add_positions(positions),
-            "NORMAL": self._add_floats(normals),
+            "POSITION": self._add_positions(plant.positions[vertices]),
+            "NORMAL": self._add_floats(_unit_normals(plant.normals[vertices])),
         }
         if frames is not None:
             attributes["TANGENT"] = self._add_floats(frames)
@@ -207,9 +220,12 @@ class _Writer:
             share = np.clip(plant.colors[vertices], 0.0, 1.0)
             colors = np.round(share * 65535).astype(np.uint16)
             attributes["COLOR_0"] = self.document.add_accessor(colors, normalized=True)
+        if branches is not None and owner is not None:
+            attributes["_BRANCH"] = self._add_floats(owner)
+            attributes["_BRANCH_PARENT"] = self._add_floats(branches.parent[owner])
         return {
             "attributes": attributes,
-            "indices": self._add_indices(faces.ravel(), len(positions)),
+            "indices": self._add_indices(faces.ravel(), len(vertices)),
             "material": self._add_material(material),
         }
 
@@ -217,7 +233,7 @@ class _Writer:
         local = (positions - self._origin).astype(np.float32)
         return self.document.add_accessor(local, bounds=True)
 
-    def _add_floats(self, values: FloatArray) -> int:
+    def _add_floats(self, values: FloatArray | IntArray) -> int:
         return self.document.add_accessor(values.astype(np.float32))
 
     def _add_indices(self, indices: IntArray, vertices: int) -> int:
@@ -313,6 +329,24 @@ def _compact(faces: IntArray, count: int) -> tuple[IntArray, IntArray]:
     used[faces] = True
     renumbered = np.cumsum(used, dtype=np.int32) - 1
     return np.flatnonzero(used).astype(np.int32), renumbered[faces].astype(np.int32)
+
+
+def _split_by_group(faces: IntArray, group: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+    """Vertices such that no two faces (f, 3) of different groups (f,) share one.
+
+    Returns (n,) the old vertex of each new one, in order; (f, 3) faces of new vertices; (n,) the
+    group of each new vertex.
+    """
+    groups = int(group.max(initial=0)) + 1
+    keys, renumbered = np.unique(
+        faces.astype(np.int64) * groups + group[:, None], return_inverse=True
+    )
+    vertices, owner = np.divmod(keys, groups)
+    return (
+        vertices.astype(np.int32),
+        renumbered.reshape(-1, 3).astype(np.int32),
+        owner.astype(np.int32),
+    )
 
 
 def _unit_normals(normals: FloatArray) -> FloatArray:

@@ -1,0 +1,209 @@
+"""What vegtool writes, as other people's programs read it.
+
+Every model is converted once, by the command line; then Khronos's validator reads every file, and
+three.js draws every file in headless Chromium. tests/clients/run installs what this needs.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import shutil
+import struct
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vegtool.formats import READERS
+from vegtool.growth import SAMPLES
+
+HERE = Path(__file__).parent
+PACKAGES = Path(os.environ.get("VEGTOOL_NODE_MODULES", HERE / "node_modules"))
+MODELS = Path(os.environ.get("VEGTOOL_MODELS", HERE.parents[2] / "shared" / "models"))
+BROWSERS = (
+    os.environ.get("VEGTOOL_CHROMIUM", ""),
+    "chromium",
+    "chromium-browser",
+    "google-chrome",
+    "/Applications/Google Chrome.app/Contents/MacOS/Google Chrome",
+)
+BROWSER = next(filter(None, map(shutil.which, filter(None, BROWSERS))), None)
+
+SIZE = 256  # pixels; the first billboard level is made for a plant about this large
+VIEWS = [[1, 0.2, 0], [0, 0.2, 1], [-1, 0.2, 0], [0, 0.2, -1], [1, 1, 1], [0, 1, 0.01]]
+LEAST_OVERLAP = 0.5  # intersection over union of the silhouettes of original and level 1
+LEAST_COVER = 0.25  # of the original's silhouette, for a coarser level to count as the plant
+SAME_MODEL = 0.95  # intersection over union of the user's own file and level 0
+
+
+def missing() -> str | None:
+    """What is not here that the checks need."""
+    if shutil.which("node") is None:
+        return "needs Node.js"
+    if not (PACKAGES / "three").is_dir():
+        return "needs npm packages: tests/clients/run installs them"
+    if BROWSER is None:
+        return "needs Chromium"
+    return None
+
+
+pytestmark = [
+    pytest.mark.clients,
+    pytest.mark.skipif(missing() is not None, reason=missing() or ""),
+]
+
+
+def model_files() -> list[Path]:
+    """The real plants, where their folder is here."""
+    return sorted(p for p in MODELS.rglob("*") if p.suffix.lower() in READERS)
+
+
+SOURCES = [
+    *(f"models/{p.relative_to(MODELS)}" for p in model_files()),
+    *map("sample {}".format, SAMPLES),
+]
+
+
+@dataclass(frozen=True)
+class Written:
+    """What one conversion wrote."""
+
+    source: Path
+    combined: Path
+    levels: list[Path]  # without the original
+
+    @property
+    def files(self) -> list[Path]:
+        return [self.combined, *self.levels]
+
+
+def vegtool(*arguments: str | Path) -> str:
+    """Run the command line; return what it prints."""
+    done = subprocess.run(
+        [sys.executable, "-m", "vegtool.cli", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=600,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def node(script: str, job: Any) -> list[dict[str, Any]]:
+    """Run one of the programs beside this file; return the objects that it prints."""
+    done = subprocess.run(
+        ["node", HERE / script],
+        input=json.dumps(job),
+        capture_output=True,
+        text=True,
+        timeout=600,
+        env={**os.environ, "VEGTOOL_NODE_MODULES": str(PACKAGES), "VEGTOOL_CHROMIUM": str(BROWSER)},
+    )
+    assert done.returncode == 0, done.stderr
+    return [json.loads(line) for line in done.stdout.splitlines()]
+
+
+@pytest.fixture(scope="session")
+def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Written]:
+    """Every model and every sample, converted with all defaults."""
+    folder = tmp_path_factory.mktemp("clients")
+    samples = {f"sample {name}": folder / "samples" / f"{name}.glb" for name in SAMPLES}
+    for name, path in zip(SAMPLES, samples.values(), strict=True):
+        vegtool("sample", name, "-o", path, "-q")
+    models = {f"models/{p.relative_to(MODELS)}": p for p in model_files()}
+    sources = {**models, **samples}
+    printed = vegtool("convert", *sources.values(), "-o", folder / "out", "-j", "2", "--json", "-q")
+    outcomes = {Path(outcome["source"]): outcome for outcome in json.loads(printed)}
+    return {name: _written(path, outcomes[path]) for name, path in sources.items()}
+
+
+def _written(source: Path, outcome: dict[str, Any]) -> Written:
+    manifest = next(Path(f) for f in outcome["files"] if f.endswith(".lod.json"))
+    values = json.loads(manifest.read_bytes())
+    combined, *levels = [manifest.parent / level["file"] for level in values["levels"]]
+    return Written(source, combined, levels)
+
+
+@pytest.fixture(scope="session")
+def validated(written: dict[str, Written]) -> dict[Path, dict[str, Any]]:
+    """The validator's word on every file."""
+    files = [str(file) for each in written.values() for file in each.files]
+    return {Path(answer["file"]): answer for answer in node("validate.mjs", files)}
+
+
+@pytest.fixture(scope="session")
+def drawn(written: dict[str, Written]) -> dict[Path, dict[str, Any]]:
+    """Every file as three.js draws it, seen like its original; silhouettes are (views, h, w)."""
+    jobs = []
+    for each in written.values():
+        center, radius = frame(each.combined)
+        own = [each.source] if each.source.suffix == ".glb" else []
+        jobs += [
+            {"file": str(file), "center": center, "radius": radius} for file in (*each.files, *own)
+        ]
+    answers = node("open_in_three.mjs", {"size": SIZE, "views": VIEWS, "jobs": jobs})
+    for answer in answers:
+        packed = [base64.b64decode(s) for s in answer.get("silhouettes", [])]
+        bits = np.unpackbits(np.frombuffer(b"".join(packed), np.uint8)).astype(bool)
+        answer["silhouettes"] = bits.reshape(-1, SIZE, SIZE)
+    return {Path(answer["file"]): answer for answer in answers}
+
+
+def frame(file: Path) -> tuple[list[float], float]:
+    """Centre and radius (metres) of what a combined file shows, from its own bounds."""
+    data = file.read_bytes()
+    (length,) = struct.unpack_from("<I", data, 12)
+    gltf = json.loads(data[20 : 20 + length])
+    shown = gltf["nodes"][gltf["scenes"][gltf["scene"]]["nodes"][0]]
+    primitives = gltf["meshes"][shown["mesh"]]["primitives"]
+    positions = [gltf["accessors"][p["attributes"]["POSITION"]] for p in primitives]
+    low = np.min([p["min"] for p in positions], axis=0)
+    high = np.max([p["max"] for p in positions], axis=0)
+    center = (low + high) / 2 + shown.get("translation", [0, 0, 0])
+    return center.tolist(), float(np.linalg.norm(high - low) / 2)
+
+
+def overlap(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """(views,): intersection over union of silhouettes."""
+    return (a & b).sum(axis=(1, 2)) / np.maximum((a | b).sum(axis=(1, 2)), 1)
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_the_validator_finds_no_error_and_no_warning(source, written, validated):
+    for file in written[source].files:
+        answer = validated[file]
+        bad = [m for m in answer["messages"] if m["severity"] < 2]  # 0 error, 1 warning
+        assert not bad, (file.name, bad[:5])
+        assert answer["errors"] == answer["warnings"] == 0
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_three_opens_and_draws_every_file(source, written, drawn):
+    original = drawn[written[source].combined]
+    area = original["silhouettes"].sum(axis=(1, 2))
+    for file in written[source].files:
+        answer = drawn[file]
+        assert "error" not in answer, (file.name, answer)
+        assert answer["complaints"] == [], file.name
+        cover = answer["silhouettes"].sum(axis=(1, 2)) / area
+        assert cover.min() > LEAST_COVER, (file.name, cover)
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_level_1_has_the_silhouette_of_the_original(source, written, drawn):
+    original, first = written[source].combined, written[source].levels[0]
+    shares = overlap(drawn[original]["silhouettes"], drawn[first]["silhouettes"])
+    assert shares.min() >= LEAST_OVERLAP, shares
+
+
+@pytest.mark.parametrize("source", [s for s in SOURCES if s.endswith(".glb")])
+def test_the_combined_file_shows_what_the_users_own_file_shows(source, written, drawn):
+    own, combined = written[source].source, written[source].combined
+    shares = overlap(drawn[own]["silhouettes"], drawn[combined]["silhouettes"])
+    assert shares.min() >= SAME_MODEL, shares
