@@ -12,8 +12,7 @@ from vegtool.arrays import FloatArray
 from vegtool.branches.skeleton import Skeleton
 from vegtool.branches.tubes import Tubes
 
-SAMPLES_PER_RADIUS = 0.5  # along an axis, so that the nearest sample lies on a near segment
-MOST_SAMPLES = 12  # per segment
+MOST_SAMPLES = 12  # per segment; one per diameter, so that the nearest lies on a near segment
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +29,11 @@ class Axes:
     radius_b: FloatArray
     tube: np.ndarray
     along: FloatArray
+
+    @cached_property
+    def tree(self) -> Any:
+        """A k-d-tree of the samples."""
+        return tree_of(self.samples[0])
 
     @cached_property
     def samples(self) -> tuple[FloatArray, np.ndarray]:
@@ -57,7 +61,7 @@ class Axes:
 
 
 def axes_of(rings: Skeleton, tubes: Tubes) -> Axes:
-    """One segment per ring: to the ring before it. A tube that starts a part has one point there."""
+    """One segment per ring, to the ring before it; of no length where a part starts."""
     b = np.arange(len(rings.parent))
     a = np.where(rings.parent >= 0, rings.parent, b)
     begins = tubes.start[tubes.ring_tube]

@@ -12,59 +12,63 @@ from __future__ import annotations
 import numpy as np
 
 from vegtool.arrays import FloatArray
-from vegtool.branches.axes import Axes, tree_of
+from vegtool.branches.axes import Axes
 from vegtool.branches.parts import Parts
 
 NEIGHBOURS = 3  # axis samples looked at for each anchor
 BLOB = 0.3  # of the plant's radius: a leaf part whose radius is larger goes face by face
 DEPTH = 0.1  # inside wood, a tenth of the distance to the axis counts
 OFTEN = 0.5  # of the most frequent one: edges nearest to wood so often may be the attached one
-MOST_SLOTS = 64  # edges of one leaf: larger leaf parts have no such order
+ASKED = 1000  # leaves of each number of faces that are asked which edge that is
+MOST_FACES = 24  # of a leaf whose edges are compared with those of others
 
 
 def hang_leaves(parts: Parts, axes: Axes) -> np.ndarray:
     """(f,) tube of each face of the leaf parts."""
     owner = _owners(parts)
     corners = parts.positions[parts.faces]
-    anchors = (corners + np.roll(corners, -1, axis=1)).reshape(-1, 3) / 2
-    tube, cost = nearest_tubes(anchors, axes)
-    of = np.repeat(owner, 3)
-    cost = np.where(_attached(owner, cost), cost, np.inf)
-    order = np.lexsort((cost, of))
-    best = order[np.searchsorted(of[order], np.arange(int(owner.max()) + 1))]
-    return np.asarray(tube[best][owner])
-
-
-def _attached(owner: np.ndarray, cost: FloatArray) -> np.ndarray:
-    """(3f,) bool: edges that may be the attached one, by leaves of one number of faces."""
-    order = np.argsort(owner, kind="stable")
-    size = np.bincount(owner)
-    nth = np.empty(len(owner), dtype=np.int64)
-    nth[order] = np.arange(len(owner)) - np.repeat(np.cumsum(size) - size, size)
-    slot = (3 * nth[:, None] + np.arange(3)).ravel()
-    of = np.repeat(owner, 3)
-    may = np.ones(len(cost), dtype=bool)
-    for faces in np.unique(size[size <= MOST_SLOTS // 3]):
-        rows = np.flatnonzero(size[of] == faces)
-        table = np.empty((int((size == faces).sum()), 3 * faces))
-        leaf = np.unique(of[rows], return_inverse=True)[1]
-        table[leaf, slot[rows]] = cost[rows]
-        wins = np.bincount(table.argmin(axis=1), minlength=3 * faces)
-        may[rows] = (wins >= OFTEN * wins.max())[slot[rows]]
-    return may
+    anchors = ((corners + np.roll(corners, -1, axis=1)) / 2).reshape(-1, 3)
+    leaf = np.repeat(owner, 3)
+    rows = np.flatnonzero(_attached(owner, anchors, axes))
+    tube, cost = nearest_tubes(anchors[rows], axes)
+    order = np.lexsort((cost, leaf[rows]))
+    first = np.searchsorted(leaf[rows][order], np.arange(int(owner.max()) + 1))
+    return np.asarray(tube[order[first]][owner])
 
 
 def nearest_tubes(points: FloatArray, axes: Axes) -> tuple[np.ndarray, FloatArray]:
     """(n,) the tube nearest to each point, and the cost of it: the gap to the surface."""
-    samples, segment_of = axes.samples
-    k = min(NEIGHBOURS, len(samples))
-    near = tree_of(samples).query(points, k=k)[1].reshape(len(points), k)
+    segment_of = axes.samples[1]
+    k = min(NEIGHBOURS, len(segment_of))
+    near = axes.tree.query(points, k=k)[1].reshape(len(points), k)
     segment = segment_of[near]
     distance, radius, _ = axes.measure(points, segment)
     cost = np.maximum(distance - radius, 0) + DEPTH * distance
     best = cost.argmin(axis=1)
     row = np.arange(len(points))
     return axes.tube[segment[row, best]], cost[row, best]
+
+
+def _attached(owner: np.ndarray, anchors: FloatArray, axes: Axes) -> np.ndarray:
+    """(3f,) bool: edges that may be the attached one, told by leaves of one number of faces."""
+    size = np.bincount(owner)
+    order = np.argsort(owner, kind="stable")
+    nth = np.empty(len(owner), dtype=np.int64)
+    nth[order] = np.arange(len(owner)) - np.repeat(np.cumsum(size) - size, size)
+    slot = (3 * nth[:, None] + np.arange(3)).ravel()
+    faces_of = np.repeat(size[owner], 3)
+    may = np.ones(len(anchors), dtype=bool)
+    for faces in np.unique(size[size <= MOST_FACES]):
+        leaves = np.flatnonzero(size == faces)
+        asked = np.zeros(len(size), dtype=bool)
+        asked[leaves[:: -(-len(leaves) // ASKED)]] = True
+        rows = order[asked[owner[order]]]  # leaf by leaf, each face by face
+        edges = (3 * rows[:, None] + np.arange(3)).ravel()
+        cost = nearest_tubes(anchors[edges], axes)[1].reshape(-1, 3 * faces)
+        wins = np.bincount(cost.argmin(axis=1), minlength=3 * faces)
+        rows = np.flatnonzero(faces_of == faces)
+        may[rows] = (wins >= OFTEN * wins.max())[slot[rows]]
+    return may
 
 
 def _owners(parts: Parts) -> np.ndarray:

@@ -25,16 +25,15 @@ RUNS_PER_PART = 1.5  # at most so many stretches of the file per part: the order
 class Parts:
     """Connected parts of a set of faces, with their welded vertices.
 
-    faces: (f, 3) int64 indices into positions, numbered as the faces show them. positions: (v, 3) in units of the plant's radius;
-    vertices of two parts are never one. face_part: (f,) part of each face, in order of first face.
-    vertex_part: (v,). soup: whether the file's vertices had to be welded across faces.
+    faces: (f, 3) int64 indices into positions, numbered as the faces show them.
+    positions: (v, 3) in units of the plant's radius; vertices of two parts are never one.
+    face_part: (f,) part of each face, in order of first face. vertex_part: (v,).
     """
 
     faces: np.ndarray
     positions: FloatArray
     face_part: Labels
     vertex_part: Labels
-    soup: bool
 
     @property
     def count(self) -> int:
@@ -49,13 +48,12 @@ def connected_parts(positions: FloatArray, faces: np.ndarray) -> Parts:
     """
     place = _dense(weld(positions)[faces].ravel()).reshape(-1, 3)
     part = _face_parts(faces)
-    soup = len(faces) < SOUP_FACES_PER_PART * (part.max() + 1)
-    if soup:
+    if len(faces) < SOUP_FACES_PER_PART * (part.max() + 1):
         part = _soup_parts(place)
     part, _ = _by_first(part)
     vertex, first = _by_first((part[:, None] * (place.max() + 1) + place).ravel())
     corner = faces.ravel()[first]
-    return Parts(vertex.reshape(-1, 3), positions[corner], part, part[first // 3], soup)
+    return Parts(vertex.reshape(-1, 3), positions[corner], part, part[first // 3])
 
 
 def weld(positions: FloatArray) -> Labels:
@@ -90,7 +88,7 @@ def _dense(labels: Labels) -> Labels:
 
 def _face_parts(faces: np.ndarray) -> Labels:
     a, b = faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel()
-    return components(int(faces.max()) + 1, a, b)[faces[:, 0]]
+    return np.asarray(components(int(faces.max()) + 1, a, b)[faces[:, 0]])
 
 
 def _soup_parts(place: np.ndarray) -> Labels:

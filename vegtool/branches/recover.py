@@ -74,14 +74,14 @@ def _branches(face_tube: np.ndarray, parent: np.ndarray) -> Branches:
     order = np.lexsort((np.arange(len(parent)), level))
     rank = np.empty(len(parent), dtype=np.int32)
     rank[order] = np.arange(len(parent))
-    new_parent = np.where(parent[order] >= 0, rank[parent[order]], -1)
-    return Branches(rank[face_tube], new_parent, level[order], "recovered")
+    new_parent = np.where(parent[order] >= 0, rank[parent[order]], -1).astype(np.int32)
+    return Branches(rank[face_tube], new_parent, level[order].astype(np.int32), "recovered")
 
 
 def _without_wood(parts: Parts) -> Branches:
     """A trunk that nobody sees and, where the leaves fall apart, a branch for each part."""
-    count = parts.count
-    if count == 1:
-        return Branches(parts.face_part, [-1], [0], "recovered")
-    parent = np.concatenate([[-1], np.zeros(count, dtype=np.int64)])
-    return Branches(parts.face_part + 1, parent, parent + 1, "recovered")
+    trunk = np.array([-1], dtype=np.int32)
+    if parts.count > 1:
+        parent = np.append(trunk, np.zeros(parts.count, dtype=np.int32))
+        return Branches((parts.face_part + 1).astype(np.int32), parent, parent + 1, "recovered")
+    return Branches(parts.face_part.astype(np.int32), trunk, trunk + 1, "recovered")
