@@ -26,7 +26,7 @@ COVERAGE_LIMIT = 0.2
 leaves and closed wood, whose tubes clustering cuts open, measured 0.01 to 0.13."""
 COLOR_LIMIT = 0.05
 """Distance in sRGB, 13 levels of 255; trees with one leaf texture measured 0.002 to 0.017."""
-TURN = 1.02
+TURN = 1.1
 """A billboard is turned round where its back covers this many times what its front covers."""
 
 

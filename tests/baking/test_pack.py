@@ -1,0 +1,54 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from vegtool.baking.pack import BLOCK, pack
+
+SIZES = st.lists(st.tuples(st.integers(1, 60), st.integers(1, 60)), min_size=1, max_size=60)
+
+
+@settings(max_examples=60, deadline=None)
+@given(SIZES, st.integers(0, 3))
+def test_rectangles_lie_inside_and_apart(sizes, gutter):
+    """Each texel belongs to one rectangle and gutter at most, and none lies outside."""
+    sizes = np.array(sizes)
+    packing = pack(sizes, gutter, 4096)
+    assert packing.width % BLOCK == 0 and packing.height % BLOCK == 0
+    assert (packing.rect[:, 2:] == sizes).all()
+    owners = np.zeros((packing.height, packing.width), dtype=int)
+    for x, y, w, h in packing.rect:
+        assert x >= gutter and y >= gutter
+        assert x + w + gutter <= packing.width and y + h + gutter <= packing.height
+        owners[y - gutter : y + h + gutter, x - gutter : x + w + gutter] += 1
+    assert owners.max() == 1
+    assert packing.fill == pytest.approx((owners > 0).mean())
+
+
+@pytest.mark.parametrize("count", [22, 67, 200, 600, 20_000])
+@pytest.mark.parametrize("mean", [4, 12, 30])
+def test_three_quarters_are_filled(count, mean):
+    """Sizes as clusters have them: many of the mean, some three times as long, mixed shapes."""
+    rng = np.random.default_rng(count + mean)
+    sizes = np.maximum(1, np.rint(rng.gamma(3, mean / 3, (count, 2)))).astype(int)
+    assert pack(sizes, 2, 8192).fill >= 0.75
+
+
+def test_one_rectangle_takes_no_more_than_the_next_multiple_of_four():
+    packing = pack(np.array([[13, 5]]), 2, 2048)
+    assert (packing.width, packing.height) == (20, 12)
+    assert packing.rect.tolist() == [[2, 2, 13, 5]]
+
+
+def test_the_same_sizes_give_the_same_packing_whatever_came_before():
+    sizes = np.random.default_rng(0).integers(1, 40, (300, 2))
+    first = pack(sizes, 2, 2048).rect
+    pack(sizes[::-1], 1, 512)
+    assert (pack(sizes, 2, 2048).rect == first).all()
+
+
+def test_the_width_keeps_to_the_limit_where_the_rectangles_do():
+    packing = pack(np.full((200, 2), 30), 2, 250)
+    assert packing.width <= 250
