@@ -77,7 +77,7 @@ class ReadOptions:
             ) from None
 
 
-def read_plant(path: str | Path, options: ReadOptions = ReadOptions()) -> Plant:  # noqa: B008
+def read_plant(path: str | Path, options: ReadOptions = ReadOptions()) -> Plant:
     """Read a plant model.
 
     Raises InputError for a file that is missing, broken or not a plant, CapabilityError for one

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from vegtool.arrays import FloatArray, IntArray, unit
+from vegtool.arrays import FloatArray, unit
+from vegtool.formats.parts import IndexArray
 
 LARGEST = 1e15
 """File units: a coordinate beyond it is as broken as an infinite one."""
@@ -22,7 +23,7 @@ def finite_vertices(positions: FloatArray) -> np.ndarray:
         return np.asarray((np.abs(positions) < LARGEST).all(axis=1))
 
 
-def flat_faces(positions: FloatArray, faces: IntArray) -> np.ndarray:
+def flat_faces(positions: FloatArray, faces: IndexArray) -> np.ndarray:
     """(f,) bool: faces without area."""
     a, b, c = (positions[faces[:, k]] for k in range(3))
     ab, ac = b - a, c - a
@@ -30,7 +31,9 @@ def flat_faces(positions: FloatArray, faces: IntArray) -> np.ndarray:
     return np.asarray(_squared(np.cross(ab, ac)) <= FLATTEST**2 * longest**2)
 
 
-def repeated_faces(positions: FloatArray, uvs: FloatArray, faces: IntArray, group: IntArray) -> np.ndarray:
+def repeated_faces(
+    positions: FloatArray, uvs: FloatArray, faces: IndexArray, group: IndexArray
+) -> np.ndarray:
     """(f,) bool: faces that repeat an earlier one exactly: the same three positions and texture
     coordinates in the same order of turning, in the same group (material).
 
@@ -58,7 +61,7 @@ def repeated_faces(positions: FloatArray, uvs: FloatArray, faces: IntArray, grou
     return repeats
 
 
-def smooth_normals(positions: FloatArray, faces: IntArray, point: IntArray) -> FloatArray:
+def smooth_normals(positions: FloatArray, faces: IndexArray, point: IndexArray) -> FloatArray:
     """(v, 3) unit normals, the sum of the area vectors of the faces around each point.
 
     point: (v,) index of the point that a vertex belongs to; vertices of one point share a normal.
@@ -71,7 +74,15 @@ def smooth_normals(positions: FloatArray, faces: IntArray, point: IntArray) -> F
     total = np.stack(
         [np.bincount(corner, np.tile(area[:, k], 3), minlength=count) for k in range(3)], axis=1
     )
-    return unit(total)[point]
+    return unit(np.asarray(total, dtype=np.float64))[point]
+
+
+def last_face_normals(positions: FloatArray, faces: IndexArray) -> FloatArray:
+    """(v, 3) unit normals, each of the last face that uses the vertex; zero where none does."""
+    a, b, c = (positions[faces[:, k]] for k in range(3))
+    normals = np.zeros_like(positions)
+    normals[faces] = unit(np.cross(b - a, c - a))[:, None]
+    return normals
 
 
 def _squared(vectors: FloatArray) -> FloatArray:
@@ -91,4 +102,4 @@ def _mix(key: np.ndarray) -> np.ndarray:
     """Scatter 64-bit keys (the finaliser of MurmurHash3, public domain)."""
     key = (key ^ (key >> np.uint64(33))) * np.uint64(0xFF51AFD7ED558CCD)
     key = (key ^ (key >> np.uint64(33))) * np.uint64(0xC4CEB9FE1A85EC53)
-    return key ^ (key >> np.uint64(33))
+    return np.asarray(key ^ (key >> np.uint64(33)))

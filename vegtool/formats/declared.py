@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from vegtool.arrays import FloatArray, IntArray
+from vegtool.arrays import FloatArray
 from vegtool.formats.clean import FLATTEST
-from vegtool.formats.parts import Declared
+from vegtool.formats.parts import Declared, IndexArray
 from vegtool.plant import Branches, Plant
 
 FEWEST = 3
@@ -26,7 +26,7 @@ NEIGHBOURS = 12
 
 
 def resolve_branches(
-    plant: Plant, face_branch: IntArray, declared: Declared | None, notes: list[str]
+    plant: Plant, face_branch: IndexArray, declared: Declared | None, notes: list[str]
 ) -> Branches | None:
     """The plant's branches as declared, or None where the file's parts are no branches.
 
@@ -68,41 +68,39 @@ def resolve_branches(
 
 
 def _without_woodless(
-    face_branch: IntArray, parent: IntArray, wood: np.ndarray
-) -> tuple[IntArray, IntArray]:
+    face_branch: IndexArray, parent: IndexArray, wood: np.ndarray
+) -> tuple[IndexArray, IndexArray]:
     """Branches that have wood; the faces of others (leaf nodes, empty joints) go to the nearest
     ancestor that has, or to none."""
     has_wood = np.zeros(len(parent), dtype=bool)
     has_wood[face_branch[wood & (face_branch >= 0)]] = True
     above = np.where(has_wood, np.arange(len(parent)), parent)
-    for _ in range(len(parent)):
-        woodless = (above >= 0) & ~has_wood[above]
-        if not woodless.any():
-            break
-        above[woodless] = parent[above[woodless]]
-    else:
-        above[(above >= 0) & ~has_wood[above]] = -1  # a circle
+    for _ in range(_doublings(len(parent))):
+        above = np.where(above >= 0, above[above], -1)
+    above[(above >= 0) & ~has_wood[above]] = -1  # a circle without wood
     index = np.append(np.cumsum(has_wood) - 1, -1)
     own_parent = np.where(parent >= 0, above[parent], -1)[has_wood]
     return index[np.where(face_branch >= 0, above[face_branch], -1)], index[own_parent]
 
 
-def _levels(parent: IntArray) -> IntArray | None:
-    """(b,) steps to the trunk, or None where parents form a circle."""
-    level = np.zeros(len(parent), dtype=np.int64)
-    above = parent.copy()
-    for _ in range(len(parent)):
-        climbing = above >= 0
-        if not climbing.any():
-            return level
-        level[climbing] += 1
-        above[climbing] = parent[above[climbing]]
-    return level if not (above >= 0).any() else None
+def _levels(parent: IndexArray) -> IndexArray | None:
+    """(b,) steps to the trunk, or None where parents form a circle. By pointer doubling."""
+    above = parent.astype(np.int64)
+    level = (above >= 0).astype(np.int64)
+    for _ in range(_doublings(len(parent))):
+        level = level + np.where(above >= 0, level[above], 0)
+        above = np.where(above >= 0, above[above], -1)
+    return level if (above < 0).all() else None
+
+
+def _doublings(count: int) -> int:
+    """How often a chain of `count` links is halved until one is left."""
+    return count.bit_length() + 1
 
 
 def _parents_by_level(
-    plant: Plant, face_branch: IntArray, level: IntArray, wood: np.ndarray
-) -> IntArray | None:
+    plant: Plant, face_branch: IndexArray, level: IndexArray, wood: np.ndarray
+) -> IndexArray | None:
     """(b,) parents: of the branches one level above, the one nearest to a branch's base.
 
     None where a branch that has wood has no level or no branch above it.
@@ -143,19 +141,36 @@ def _circle_centers(points: FloatArray) -> FloatArray:
     toward = np.cross(normal, u) * v2 + np.cross(v, normal) * u2
     round_ = n2 > FLATTEST**2 * u2 * v2
     centers = a + np.divide(toward, 2 * n2, out=np.zeros_like(a), where=round_)
-    return np.where(round_, centers, points.mean(axis=1))
+    return np.asarray(np.where(round_, centers, points.mean(axis=1)))
 
 
-def _hang_on_nearest(plant: Plant, face_branch: IntArray) -> IntArray:
-    """Every face without a branch gets that of the wood nearest to any of its corners."""
+def _hang_on_nearest(plant: Plant, face_branch: IndexArray) -> IndexArray:
+    """Every face without a branch gets that of the wood nearest to its anchor.
+
+    Faces that share vertices (a card, a spray) hang together; their anchor is that midpoint of
+    their edges, a card's stalk end, which lies nearest to wood.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
     known = np.flatnonzero(face_branch >= 0)
-    owner = np.repeat(face_branch[known], 3)
-    tree = cKDTree(plant.corners[known].reshape(-1, 3))
     loose = np.flatnonzero(face_branch < 0)
-    distance, nearest = tree.query(plant.corners[loose].reshape(-1, 3))
-    best = distance.reshape(-1, 3).argmin(axis=1)
+    wood = np.concatenate([plant.corners[known].reshape(-1, 3), plant.face_centroids[known]])
+    owner = np.concatenate([np.repeat(face_branch[known], 3), face_branch[known]])
+    corners = plant.corners[loose]
+    middles = 0.5 * (corners + corners[:, [1, 2, 0]])
+    distance, nearest = cKDTree(wood).query(middles.reshape(-1, 3))
+    faces = plant.faces[loose]
+    size = len(plant.positions)
+    edges = coo_array(
+        (np.ones(2 * len(faces)), (faces[:, :2].ravel(), faces[:, 1:].ravel())), shape=(size, size)
+    )
+    _, piece = connected_components(edges, directed=False)
+    of_edge = np.repeat(piece[faces[:, 0]], 3)
+    best = np.full(of_edge.max() + 1, -1, dtype=np.int64)
+    order = np.argsort(-distance, kind="stable")
+    best[of_edge[order]] = owner[nearest[order]]  # the last written, the nearest, stays
     filled = face_branch.copy()
-    filled[loose] = owner[nearest.reshape(-1, 3)[np.arange(len(loose)), best]]
+    filled[loose] = best[piece[faces[:, 0]]]
     return filled

@@ -64,7 +64,9 @@ def _roots(file: GltfFile, notes: list[str]) -> list[int]:
     if scenes:
         chosen = file.json.get("scene", 0)
         if len(scenes) > 1:
-            notes.append(f"read scene {chosen} of {len(scenes)}, the file's default; not the others")
+            notes.append(
+                f"read scene {chosen} of {len(scenes)}, the file's default; not the others"
+            )
         roots: list[int] = list(file.entry("scenes", chosen).get("nodes", []))
         return roots
     nodes = file.json.get("nodes", [])

@@ -1,12 +1,18 @@
-"""What every reader hands to `read.assemble`: the file's content, not yet cleaned or interpreted."""
+"""What every reader hands to `read.assemble`: a file's content, neither cleaned nor interpreted."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
-from vegtool.arrays import FloatArray, IntArray
+import numpy as np
+import numpy.typing as npt
+
+from vegtool.arrays import FloatArray
 from vegtool.plant import Material
+
+IndexArray = npt.NDArray[np.integer[Any]]
+"""Indices of any integer type: files have their own, a Plant has int32."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,14 +28,14 @@ class Part:
     """
 
     positions: FloatArray
-    faces: IntArray
+    faces: IndexArray
     material: int
     name: str = ""
     normals: FloatArray | None = None
     uvs: FloatArray | None = None
     colors: FloatArray | None = None
-    point: IntArray | None = None
-    branch: IntArray | int = -1
+    point: IndexArray | None = None
+    branch: IndexArray | int = -1
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,8 +47,8 @@ class Declared:
     """
 
     source: Literal["nodes", "groups", "skeleton", "attribute"]
-    parent: IntArray | None = None
-    level: IntArray | None = None
+    parent: IndexArray | None = None
+    level: IndexArray | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from vegtool.arrays import FloatArray, IntArray
+from vegtool.arrays import FloatArray
+from vegtool.formats.parts import IndexArray
 
 
-def triangulate(corners: IntArray, points: FloatArray) -> IntArray:
+def triangulate(corners: IndexArray, points: FloatArray) -> IndexArray:
     """(n * (k - 2), 3) places in 0..k-1 of the triangles of n polygons, those of one together.
 
     corners: (n, k) indices into points (p, 3). A convex polygon becomes a fan around its first
@@ -35,7 +36,7 @@ def _convex(rings: FloatArray) -> np.ndarray:
         return np.asarray(~(along < -slack).any(axis=1))
 
 
-def _ears(ring: FloatArray) -> IntArray:
+def _ears(ring: FloatArray) -> IndexArray:
     """(k - 2, 3) triangles of one polygon (k, 3), by ear clipping in the plane of its normal."""
     normal = np.cross(ring, np.roll(ring, -1, axis=0)).sum(axis=0)
     drop = int(np.abs(normal).argmax())

@@ -7,17 +7,18 @@ from pathlib import Path
 
 import numpy as np
 
-from vegtool.arrays import FloatArray, IntArray
+from vegtool.arrays import FloatArray, unit
 from vegtool.errors import InputError
 from vegtool.formats import ReadOptions
 from vegtool.formats.clean import (
     finite_vertices,
     flat_faces,
+    last_face_normals,
     repeated_faces,
     smooth_normals,
 )
 from vegtool.formats.declared import resolve_branches
-from vegtool.formats.parts import Parsed, Part
+from vegtool.formats.parts import IndexArray, Parsed, Part
 from vegtool.formats.roles import guess_role, named_roles
 from vegtool.formats.upright import UPRIGHT, guess_up
 from vegtool.plant import Material, Plant
@@ -26,8 +27,8 @@ MAX_FACES = 30_000_000
 """More than that is a landscape, or an attack by instances of instances."""
 SHORTEST_NORMAL = 1e-6
 """A stored normal shorter than this says nothing."""
-COARSE_STEP = 1e-4
-"""Fraction of the plant's diagonal: coordinates rounded to coarser steps deserve a warning."""
+WIDEST_UV = 1e9
+"""Texture coordinates beyond are as broken as infinite ones."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,11 +43,11 @@ class _Mesh:
     normals: FloatArray
     uvs: FloatArray
     colors: FloatArray | None
-    point: IntArray
-    faces: IntArray
-    material: IntArray
-    branch: IntArray
-    part: IntArray
+    point: IndexArray
+    faces: IndexArray
+    material: IndexArray
+    branch: IndexArray
+    part: IndexArray
 
 
 def assemble(parsed: Parsed, path: Path, options: ReadOptions) -> Plant:
@@ -65,8 +66,8 @@ def assemble(parsed: Parsed, path: Path, options: ReadOptions) -> Plant:
         normals=mesh.normals @ turn.T,
         uvs=mesh.uvs,
         colors=mesh.colors,
-        faces=mesh.faces,
-        face_material=mesh.material,
+        faces=mesh.faces.astype(np.int32),
+        face_material=mesh.material.astype(np.int32),
         materials=_with_roles(materials, mesh, parsed.parts, options, path),
         source=str(path),
     )
@@ -120,14 +121,14 @@ def _join(parts: list[Part], path: Path) -> _Mesh:
 def _drop_broken_faces(mesh: _Mesh, path: Path, notes: list[str]) -> _Mesh:
     """Without faces that use broken coordinates, have no area or repeat another."""
     usable = np.isfinite(mesh.positions).all(axis=1)
+    laid = np.asarray((np.abs(np.nan_to_num(mesh.uvs, nan=np.inf)) < WIDEST_UV).all(axis=1))
+    if not laid.all():
+        notes.append(f"set {(~laid).sum()} NaN or infinite texture coordinates to 0")
     total = len(mesh.faces)
-    bad_uvs = ~(np.abs(np.nan_to_num(mesh.uvs, nan=np.inf)) < 1e9).all(axis=1)
-    if bad_uvs.any():
-        notes.append(f"{_count(bad_uvs, 'texture coordinate')} broken (NaN or infinite), set to 0")
     mesh = replace(
         mesh,
         positions=np.where(usable[:, None], mesh.positions, 0.0),
-        uvs=np.where(bad_uvs[:, None], 0.0, mesh.uvs),
+        uvs=np.where(laid[:, None], mesh.uvs, 0.0),
     )
     found = {}
     steps = (
@@ -153,26 +154,16 @@ def _drop_broken_faces(mesh: _Mesh, path: Path, notes: list[str]) -> _Mesh:
 def _with_normals(mesh: _Mesh, notes: list[str]) -> _Mesh:
     """Every vertex with a unit normal: its own, else the smooth one, else its face's."""
     own = np.where(np.isfinite(mesh.normals), mesh.normals, 0.0)
-    length = np.abs(own).max(axis=1, keepdims=True)
-    own = np.divide(own, length, out=np.zeros_like(own), where=length > SHORTEST_NORMAL)
-    own /= np.maximum(np.linalg.norm(own, axis=1, keepdims=True), 1e-30)
+    largest = np.abs(own).max(axis=1, keepdims=True)
+    own = unit(np.divide(own, largest, out=np.zeros_like(own), where=largest > SHORTEST_NORMAL))
     used = np.zeros(len(own), dtype=bool)
     used[mesh.faces] = True
     missing = used & ~own.any(axis=1)
     if missing.any():
         notes.append(f"computed the normals of {missing.sum()} of {used.sum()} vertices")
         own[missing] = smooth_normals(mesh.positions, mesh.faces, mesh.point)[missing]
-        cancelled = used & ~own.any(axis=1)  # the two sides of a card that share their points
-        if cancelled.any():
-            every_vertex = np.arange(len(own))
-            last = np.zeros(len(own), dtype=np.int64)
-            last[mesh.faces] = np.arange(len(mesh.faces))[:, None]
-            lone = mesh.faces[last]
-            a, b, c = (mesh.positions[lone[:, k]] for k in range(3))
-            flat = np.cross(b - a, c - a)[every_vertex]
-            own[cancelled] = (flat / np.linalg.norm(flat, axis=1, keepdims=True).clip(1e-30))[
-                cancelled
-            ]
+        cancelled = used & ~own.any(axis=1)  # where two sides of a card share their points
+        own[cancelled] = last_face_normals(mesh.positions, mesh.faces)[cancelled]
     return replace(mesh, normals=own)
 
 
@@ -231,8 +222,3 @@ def _worn(mesh: _Mesh, parts: list[Part], material: int) -> tuple[set[str], floa
 
 _SPREAD = np.array([1.0, np.sqrt(2.0), np.pi])
 """Tells points apart by one number each."""
-
-
-def _count(mask: np.ndarray, what: str) -> str:
-    count = int(mask.sum())
-    return f"{count} {what}{'s' if count != 1 else ''}"

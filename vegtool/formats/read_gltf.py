@@ -13,12 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from vegtool.arrays import FloatArray, IntArray
+from vegtool.arrays import FloatArray
 from vegtool.errors import CapabilityError, InputError
+from vegtool.formats.clean import finite_vertices
 from vegtool.formats.gltf_data import GltfFile, meshopt_missing, open_gltf
 from vegtool.formats.gltf_material import UvSource, read_materials
 from vegtool.formats.gltf_nodes import Node, scene_nodes
-from vegtool.formats.parts import Declared, Parsed, Part
+from vegtool.formats.parts import Declared, IndexArray, Parsed, Part
 from vegtool.formats.vertex_colors import settle_colors
 
 UNDERSTOOD = {
@@ -45,6 +46,9 @@ HARMLESS = {
 TRIANGLES, STRIP, FAN = 4, 5, 6
 OVERFLOW = 2**16
 """Vertices that 16-bit indices can reach."""
+FLOAT32_STEP = 2.0**-23
+COARSE = 1e-3
+"""Fraction of a mesh's extent: coordinates rounded to coarser steps are worth a warning."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,9 +59,9 @@ class _Primitive:
     """
 
     part: Part
-    joints: IntArray | None
+    joints: IndexArray | None
     weights: FloatArray | None
-    tags: dict[str, IntArray]
+    tags: dict[str, IndexArray]
 
 
 def parse(path: Path) -> Parsed:
@@ -85,7 +89,7 @@ def _parse(file: GltfFile) -> Parsed:
     nodes = scene_nodes(file, notes)
     meshes: dict[int, list[_Primitive]] = {}
     parts: list[Part] = []
-    tags: list[dict[str, IntArray]] = []
+    tags: list[dict[str, IndexArray]] = []
     for node in nodes.values():
         if node.mesh is None:
             continue
@@ -175,6 +179,7 @@ def _read_primitive(
     colors = attributes.get("COLOR_0")
     if colors is not None:
         colors = settle_colors(colors, textured[material], f"mesh {name}", notes)
+    _warn_of_rounding(positions, name, notes)
     part = Part(
         positions=_floats(positions),
         faces=_triangles(indices.astype(np.int64), mode),
@@ -210,13 +215,7 @@ def _attributes(
     indices = file.accessor(primitive["indices"])
     if indices.dtype.kind != "u" or indices.shape[1] != 1:
         raise file.broken("indices as unsigned integers", f"{indices.dtype} x {indices.shape[1]}")
-    flat = indices[:, 0]
-    restart = flat == np.iinfo(flat.dtype).max
-    if restart.any() and len(primitive["attributes"]) and not restart.all():
-        highest = int(flat[~restart].max())
-        if highest < len(attributes["POSITION"]) <= int(np.iinfo(flat.dtype).max):
-            flat = flat[~restart]
-    return attributes, flat
+    return attributes, indices[:, 0]
 
 
 def _check_overflow(
@@ -238,7 +237,22 @@ def _check_overflow(
         )
 
 
-def _triangles(indices: IntArray, mode: int) -> IntArray:
+def _warn_of_rounding(positions: np.ndarray, name: str, notes: list[str]) -> None:
+    """Note where 32-bit coordinates lie so far from 0 that a plant's detail is rounded away."""
+    if positions.dtype != np.float32 or not len(positions):
+        return
+    usable = _floats(positions)[finite_vertices(_floats(positions))]
+    if not len(usable):
+        return
+    step = float(np.abs(usable).max()) * FLOAT32_STEP
+    if step > COARSE * float(np.ptp(usable, axis=0).max()):
+        notes.append(
+            f"mesh {name}: its coordinates are so large that the file rounds them to steps of "
+            f"{step:.2g}; export it near its own origin and place it by its node"
+        )
+
+
+def _triangles(indices: IndexArray, mode: int) -> IndexArray:
     """(f, 3) triangles of a list, strip or fan; left-over indices are ignored, as glTF asks."""
     if mode == TRIANGLES:
         return indices[: len(indices) // 3 * 3].reshape(-1, 3)
@@ -272,9 +286,7 @@ def _joined(attributes: dict[str, np.ndarray], kind: str) -> np.ndarray | None:
     return np.concatenate(sets, axis=1) if sets else None
 
 
-def _place(
-    file: GltfFile, nodes: dict[int, Node], node: Node, primitive: _Primitive
-) -> list[Part]:
+def _place(file: GltfFile, nodes: dict[int, Node], node: Node, primitive: _Primitive) -> list[Part]:
     """The primitive in world space, once per instance; its branch is its node or its joint."""
     part = replace(primitive.part, name=f"{node.name} {primitive.part.name}".strip())
     if node.skin is not None and primitive.joints is not None and primitive.weights is not None:
@@ -292,10 +304,13 @@ def _moved(part: Part, matrix: FloatArray) -> Part:
     linear = matrix[:3, :3]
     mirrored = np.linalg.det(linear) < 0
     cofactors = np.cross(linear[[1, 2, 0]], linear[[2, 0, 1]]) * (-1 if mirrored else 1)
+    with np.errstate(invalid="ignore", over="ignore"):  # broken coordinates, dropped later
+        positions = part.positions @ linear.T + matrix[:3, 3]
+        normals = None if part.normals is None else part.normals @ cofactors.T
     return replace(
         part,
-        positions=part.positions @ linear.T + matrix[:3, 3],
-        normals=None if part.normals is None else part.normals @ cofactors.T,
+        positions=positions,
+        normals=normals,
         faces=part.faces[:, ::-1] if mirrored else part.faces,
     )
 
@@ -305,7 +320,7 @@ def _skinned(
     nodes: dict[int, Node],
     node: Node,
     part: Part,
-    joints: IntArray,
+    joints: IndexArray,
     weights: FloatArray,
 ) -> Part:
     """The part in the pose in which the file's joints stand; the node's own place is ignored.
@@ -344,7 +359,7 @@ def _skinned(
     )
 
 
-def _majority(corners: IntArray) -> IntArray:
+def _majority(corners: IndexArray) -> IndexArray:
     """(f,) of (f, 3): the value that two corners share, else the middle one."""
     return np.asarray(np.sort(corners, axis=1)[:, 1])
 
@@ -353,7 +368,7 @@ def _declared(
     file: GltfFile,
     nodes: dict[int, Node],
     parts: list[Part],
-    tags: list[dict[str, IntArray]],
+    tags: list[dict[str, IndexArray]],
     placed_once: bool,
 ) -> tuple[Declared | None, list[Part]]:
     """What the file says of branches: an attribute, else its skeleton, else its node tree."""
@@ -381,7 +396,7 @@ def _declared(
 
 
 def _declared_by_attribute(
-    parts: list[Part], tags: list[dict[str, IntArray]], identity: str
+    parts: list[Part], tags: list[dict[str, IndexArray]], identity: str
 ) -> tuple[Declared | None, list[Part]]:
     """Branches by the vertex attribute `identity`, with _BRANCH_LEVEL and _BRANCH_PARENT if any."""
     ids = np.unique(np.concatenate([tag[identity] for tag in tags if identity in tag]))
@@ -393,7 +408,7 @@ def _declared_by_attribute(
         for part, tag in zip(parts, tags, strict=True)
     ]
 
-    def per_branch(name: str) -> IntArray | None:
+    def per_branch(name: str) -> IndexArray | None:
         values = np.full(len(ids), -1, dtype=np.int64)
         for tag in tags:
             if identity in tag and name in tag:
@@ -407,7 +422,7 @@ def _declared_by_attribute(
     return Declared("attribute", parent=parent, level=per_branch("_BRANCH_LEVEL")), named
 
 
-def _index_of(values: IntArray, ids: IntArray) -> IntArray:
+def _index_of(values: IndexArray, ids: IndexArray) -> IndexArray:
     """Positions of values in sorted ids, -1 where absent."""
     if not len(ids):
         return np.full(values.shape, -1, dtype=np.int64)

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import io
+import re
 import struct
+import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +14,17 @@ import numpy as np
 
 from vegtool.arrays import FloatArray
 from vegtool.errors import InputError
+from vegtool.formats.alpha import settle_alpha
+from vegtool.formats.beside import find_beside
+from vegtool.formats.images import decode
 from vegtool.formats.parts import Parsed, Part
 from vegtool.formats.read_mtl import srgb_to_linear
 from vegtool.formats.vertex_colors import settle_colors
-from vegtool.plant import Material
+from vegtool.plant import Material, Texture
 
 PLAIN = Material("default", double_sided=True)
+HEADER = 65_536
+"""Bytes in which a PLY header ends."""
 
 
 def parse(path: Path) -> Parsed:
@@ -28,7 +36,9 @@ def parse(path: Path) -> Parsed:
     data = path.read_bytes()
     _check_counts(path, kind, data)
     try:
-        with np.errstate(all="ignore"):
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            warnings.simplefilter("error", DeprecationWarning)  # numpy's word for "not a number"
             stream = io.BytesIO(data)
             loaded = load_ply(stream, skip_materials=True) if kind == "PLY" else load_stl(stream)
     except Exception as error:  # trimesh raises whatever the broken file made it stumble over
@@ -37,19 +47,42 @@ def parse(path: Path) -> Parsed:
             f"({type(error).__name__}: {error}); check the file's type or export it again"
         ) from error
     notes: list[str] = []
-    solids = loaded["geometry"] if "geometry" in loaded else {"": loaded}
+    solids = loaded.get("geometry", {"": loaded})
     parts = [
         _part(path, name, solid, notes)
         for name, solid in solids.items()
         if solid.get("faces") is not None
     ]
-    return Parsed(name=path.stem, parts=parts, materials=[PLAIN], notes=notes)
+    material = replace(PLAIN, color_texture=_texture(path, data, notes)) if kind == "PLY" else PLAIN
+    return Parsed(
+        name=path.stem, parts=parts, materials=[_with_alpha(material, notes)], notes=notes
+    )
+
+
+def _texture(path: Path, data: bytes, notes: list[str]) -> Texture | None:
+    """The picture that a PLY header names in a comment, as MeshLab writes it."""
+    match = re.search(rb"^comment TextureFile (.+?)\s*$", data[:HEADER], re.MULTILINE)
+    if match is None:
+        return None
+    reference = match[1].decode("utf-8", errors="replace")
+    found = find_beside(path, reference)
+    if found is None:
+        notes.append(f"texture {reference} is missing; drawn without it")
+        return None
+    return decode(found.read_bytes(), found.name, f"{path}: texture {found.name}")
+
+
+def _with_alpha(material: Material, notes: list[str]) -> Material:
+    mode, cutoff, base_color = settle_alpha(
+        material.name, "AUTO", 0.5, material.base_color, material.color_texture, notes
+    )
+    return replace(material, alpha_mode=mode, alpha_cutoff=cutoff, base_color=base_color)
 
 
 def _check_counts(path: Path, kind: str, data: bytes) -> None:
     """Refuse a header that claims more elements than the file could hold, before any is made."""
     if kind == "PLY":
-        header = data[:65536].partition(b"end_header")[0]
+        header = data[:HEADER].partition(b"end_header")[0]
         counts = [
             int(line.split()[2])
             for line in header.splitlines()
@@ -57,7 +90,7 @@ def _check_counts(path: Path, kind: str, data: bytes) -> None:
         ]
         claimed = sum(counts)
     else:
-        binary = len(data) >= 84 and not data.lstrip()[:5].lower() == b"solid"
+        binary = len(data) >= 84 and data.lstrip()[:5].lower() != b"solid"
         claimed = 50 * struct.unpack_from("<I", data, 80)[0] if binary else 0
     if claimed > len(data):
         raise InputError(

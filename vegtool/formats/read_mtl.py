@@ -171,7 +171,7 @@ def _with_alpha(
     textures: dict[str, Texture | None],
     notes: list[str],
 ) -> Texture | None:
-    """The colour texture with the alpha that map_d gives: its alpha channel, else its brightness."""
+    """The colour texture with the alpha of map_d: its alpha channel, else its brightness."""
     if color_map is not None and _short(color_map.file) == _short(alpha_map.file):
         return texture
     mask = _texture(alpha_map, model, textures, notes)

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from vegtool.arrays import FloatArray, IntArray
+from vegtool.arrays import FloatArray
 from vegtool.errors import InputError
 from vegtool.formats.beside import find_beside
-from vegtool.formats.parts import Declared, Parsed, Part
+from vegtool.formats.parts import Declared, IndexArray, Parsed, Part
 from vegtool.formats.polygons import triangulate
 from vegtool.formats.read_mtl import ObjMaterial, read_mtl, srgb_to_linear
 from vegtool.formats.vertex_colors import settle_colors
@@ -52,8 +52,8 @@ class _Statements:
 class _Triangles:
     """corners: (f, 3, 3) indices of v, vt, vn per corner, -1 for none. face: (f,) its statement."""
 
-    corners: IntArray
-    face: IntArray
+    corners: IndexArray
+    face: IndexArray
 
 
 def parse(path: Path) -> Parsed:
@@ -176,8 +176,8 @@ def _read_faces(
     for index, rest in enumerate(lines.faces):
         shape = (len(rest.split()), rest.count("/"), "//" in rest)
         shapes.setdefault(shape, []).append(index)
-    corners: list[IntArray] = []
-    faces: list[IntArray] = []
+    corners: list[IndexArray] = []
+    faces: list[IndexArray] = []
     for (size, slashes, skips), members in shapes.items():
         if size < 3:
             notes.append(f"dropped {len(members)} faces with fewer than three corners")
@@ -210,7 +210,7 @@ def _read_faces(
     return _Triangles(corner, face[order])
 
 
-def _corner_indices(texts: list[str], size: int, slashes: int, skips: bool) -> IntArray:
+def _corner_indices(texts: list[str], size: int, slashes: int, skips: bool) -> IndexArray:
     """(n, size, 3) indices as written, 0 for none, of faces of one shape."""
     joined = " ".join(texts)
     found = np.zeros((len(texts), size, 3), dtype=np.int64)
@@ -234,8 +234,8 @@ def _corner_indices(texts: list[str], size: int, slashes: int, skips: bool) -> I
 
 
 def _absolute(
-    polygons: IntArray, member: IntArray, lines: _Statements, totals: tuple[int, int, int]
-) -> IntArray:
+    polygons: IndexArray, member: IndexArray, lines: _Statements, totals: tuple[int, int, int]
+) -> IndexArray:
     """Indices from 0; -1 for none; relative ones counted back from where they stand."""
     result = polygons - 1
     relative = polygons < 0
@@ -246,7 +246,7 @@ def _absolute(
     return result
 
 
-def _check_corners(path: Path, polygons: IntArray, count: int, texts: list[str]) -> None:
+def _check_corners(path: Path, polygons: IndexArray, count: int, texts: list[str]) -> None:
     """Refuse faces that name missing points: what is left of such a file is not to be trusted."""
     wild = ((polygons[..., 0] < 0) | (polygons[..., 0] >= count)).any(axis=1)
     if wild.any():
@@ -279,14 +279,14 @@ def _read_materials(path: Path, lines: _Statements, notes: list[str]) -> list[Ob
 
 
 def _part(
-    corners: IntArray,
+    corners: IndexArray,
     points: FloatArray,
     uvs: FloatArray,
     normals: FloatArray,
     colors: FloatArray | None,
     index: int,
     material: ObjMaterial,
-    group: IntArray,
+    group: IndexArray,
     groups: list[str],
     notes: list[str],
 ) -> Part:
@@ -297,7 +297,7 @@ def _part(
     _, first, inverse = np.unique(key, return_index=True, return_inverse=True)
     point, uv, normal = flat[first].T
 
-    def taken(table: FloatArray, at: IntArray) -> FloatArray:
+    def taken(table: FloatArray, at: IndexArray) -> FloatArray:
         return np.where((at >= 0)[:, None], table[np.maximum(at, 0)], 0.0)
 
     laid = taken(uvs, uv)[:, :2] * material.uv_scale + material.uv_offset if len(uvs) else None

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from vegtool.arrays import FloatArray, IntArray
+from vegtool.arrays import FloatArray
+from vegtool.formats.parts import IndexArray
 
 UPRIGHT: dict[str, FloatArray] = {
     "y": np.eye(3),
@@ -24,7 +25,7 @@ NARROW = 0.35
 """A foot is narrower than this fraction of the plant."""
 
 
-def guess_up(positions: FloatArray, faces: IntArray, notes: list[str]) -> str:
+def guess_up(positions: FloatArray, faces: IndexArray, notes: list[str]) -> str:
     """y or z: the axis along which the plant stands on 0, else on a narrow foot, else y.
 
     Vertices in use, any unit. The guess is appended to `notes`.
@@ -49,4 +50,6 @@ def _has_narrow_foot(points: FloatArray, axis: int) -> bool:
     height = points[:, axis]
     foot = points[height <= height.min() + BASE * np.ptp(height)]
     across = [k for k in range(3) if k != axis]
-    return bool((np.ptp(foot[:, across], axis=0) <= NARROW * np.ptp(points[:, across], axis=0)).all())
+    return bool(
+        (np.ptp(foot[:, across], axis=0) <= NARROW * np.ptp(points[:, across], axis=0)).all()
+    )

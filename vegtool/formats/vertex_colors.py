@@ -14,6 +14,8 @@ BLACK = 1.5 / 255
 """A channel never above this is empty."""
 WHITE = 254.5 / 255
 """Colours never below this change nothing."""
+VARIED = 0.1
+"""Colours that vary less are one tint."""
 UNALIKE = 0.5
 """Mean difference between the largest and the smallest channel over the largest: natural tints lie
 well below on textured plants, weights for wind above."""
@@ -39,15 +41,15 @@ def settle_colors(
         notes.append(f"{what}: vertex colours are all black; ignored")
         return None
     if textured and _looks_like_weights(rgb):
-        notes.append(
-            f"{what}: vertex colours look like weights for wind, not colours; ignored"
-        )
+        notes.append(f"{what}: vertex colours look like weights for wind, not colours; ignored")
         return None
     return colors
 
 
 def _looks_like_weights(rgb: FloatArray) -> bool:
-    """Pure channels, or channels that have nothing to do with one another."""
+    """Colours that vary, in pure channels or in channels that have nothing to do with another."""
+    if np.ptp(rgb, axis=0).max() <= VARIED:
+        return False
     if (rgb.max(axis=0) <= BLACK).any():
         return True
     largest = rgb.max(axis=1)
