@@ -2,7 +2,7 @@
 
 A face is nine numbers: its centroid, and the tensor n n^T of its normal (which does not tell front
 from back). Off-diagonals are scaled by sqrt 2, so that Euclidean distance is Frobenius distance.
-Positions are in plant radii from the centre; the tensor is scaled by the orientation weight.
+Positions are in plant radii from the centre; `ClusterOptions.orientation_scale` scales the tensor.
 
 Points stand for one or more faces, so that the cost of clustering does not grow with the plant:
 the halves of a quad are one *piece* (which also keeps a leaf card on one billboard), equal faces
@@ -40,14 +40,14 @@ class Samples:
     of_face: Labels
 
 
-def face_features(plant: Plant, orientation_weight: float) -> FloatArray:
+def face_features(plant: Plant, orientation_scale: float) -> FloatArray:
     """(f, 9) plant radii: centroid and scaled normal tensor of every face; see the module."""
     scale = plant.radius or 1.0
     position = (plant.corners - plant.center).mean(axis=1) / scale
     x, y, z = unit(plant.face_area_vectors / scale**2).T
     root2 = sqrt(2)
     tensor = np.stack([x * x, y * y, z * z, root2 * x * y, root2 * x * z, root2 * y * z], axis=1)
-    return np.concatenate([position, orientation_weight * tensor], axis=1)
+    return np.concatenate([position, orientation_scale * tensor], axis=1)
 
 
 def face_weights(plant: Plant) -> FloatArray:
@@ -61,13 +61,13 @@ def face_weights(plant: Plant) -> FloatArray:
 
 
 def samples(
-    plant: Plant, orientation_weight: float, count: int, group: Labels | None = None
+    plant: Plant, orientation_scale: float, count: int, group: Labels | None = None
 ) -> Samples:
     """The plant's pieces as points, or its faces where `count` asks for more than pieces.
 
     group: (f,) faces of different groups never become one point.
     """
-    features = face_features(plant, orientation_weight)
+    features = face_features(plant, orientation_scale)
     weights = face_weights(plant)
     pieces = _grouped(features, weights, quads(plant, group))
     pieces = coarser(pieces, SAME, group)

@@ -57,7 +57,7 @@ def isodata(
     plant: Plant, count: int, options: ClusterOptions, seed: int, progress: Progress
 ) -> IntArray:
     """(f,) int32 labels of at most `count` long and thin clusters. No random choice is made."""
-    fine = samples(plant, options.orientation_weight, count)
+    fine = samples(plant, options.orientation_scale(count), count)
     few = coarse(fine, limit=max(CELLS, 8 * count))
     points, weights = few.points, few.weights
     gain = 1 - 1 / options.elongation**2  # share of the squared distance along a line that is free

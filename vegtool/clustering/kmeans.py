@@ -27,7 +27,7 @@ def kmeans(
     plant: Plant, count: int, options: ClusterOptions, seed: int, progress: Progress
 ) -> IntArray:
     """(f,) int32 labels of at most `count` compact clusters."""
-    fine = samples(plant, options.orientation_weight, count)
+    fine = samples(plant, options.orientation_scale(count), count)
     few = coarse(fine, limit=max(CELLS, 8 * count))
     labels = settle(few, np.zeros(len(few.points), dtype=np.int64), count)
     if few is not fine:
