@@ -244,6 +244,7 @@ def test_the_same_input_gives_the_same_bytes_and_one_upload_serves_many_levels()
         shared = bake(buffers, labels, board, 10.0).atlas
     for name in ("color", "normal", "depth", "front"):
         assert (getattr(alone, name) == getattr(shared, name)).all()
+    assert buffers.ctx.error == "GL_NO_ERROR"
 
 
 def test_bands_meet_without_a_seam(monkeypatch):

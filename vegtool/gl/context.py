@@ -7,6 +7,8 @@ macOS (4.1). On Linux the context comes from EGL and needs neither a display nor
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from platform import system
@@ -54,6 +56,19 @@ def context() -> moderngl.Context:
         ) from error
     made.gc_mode = "auto"
     return made
+
+
+@contextmanager
+def framebuffer_kept(ctx: moderngl.Context) -> Iterator[None]:
+    """Bind what was bound before, also inside a window: GL is asked, not moderngl's memory.
+
+    A framebuffer that is released while bound leaves moderngl with a name that GL no longer knows.
+    """
+    before = ctx.detect_framebuffer()
+    try:
+        yield
+    finally:
+        before.use()
 
 
 def remedy() -> str:

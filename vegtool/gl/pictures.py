@@ -14,6 +14,7 @@ import moderngl
 import numpy as np
 
 from vegtool.arrays import ByteArray, FloatArray, IntArray
+from vegtool.gl.context import framebuffer_kept
 from vegtool.gl.program import program
 from vegtool.gl.upload import PlantBuffers
 
@@ -76,15 +77,16 @@ def draw_pictures(
     atlas = _Resolved(ctx, size)
     watch.lap("stream")
     try:
-        for first in range(0, height, rows):
-            band = (first, min(rows, height - first))
-            target.use(band[1] * samples)
-            _draw(buffers, _within(stream, pictures.rect, band), table, size, band)
-            watch.lap("draw")
-            atlas.resolve(target, samples, band)
-            watch.lap("resolve")
-        color, normal, depth = atlas.read()
-        watch.lap("read")
+        with framebuffer_kept(ctx):
+            for first in range(0, height, rows):
+                band = (first, min(rows, height - first))
+                target.use(band[1] * samples)
+                _draw(buffers, _within(stream, pictures.rect, band), table, size, band)
+                watch.lap("draw")
+                atlas.resolve(target, samples, band)
+                watch.lap("resolve")
+            color, normal, depth = atlas.read()
+            watch.lap("read")
     finally:
         for made in (table, target, atlas):
             made.release()

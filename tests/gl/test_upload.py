@@ -1,0 +1,120 @@
+from __future__ import annotations
+
+from itertools import pairwise
+
+import moderngl
+import numpy as np
+import pytest
+
+from vegtool.gl.context import framebuffer_kept
+from vegtool.gl.program import source
+from vegtool.gl.upload import PlantBuffers, bled_under_alpha, vertex_data
+from vegtool.plant import Material, Plant, Texture
+
+VERTEX = """#version 330 core
+in vec4 in_position_u; in vec4 in_normal_v; in vec4 in_color;
+out vec2 uv; out vec4 tint;
+void main() {
+    gl_Position = vec4(in_position_u.xyz, 1.0);
+    uv = vec2(in_position_u.w, in_normal_v.w);
+    tint = in_color;
+}"""
+FRAGMENT = (
+    "#version 330 core\n"
+    + source("material.glsl")
+    + "in vec2 uv; in vec4 tint; out vec4 o;\nvoid main() { o = vec4(surface_color(uv, tint), 1); }"
+)
+
+
+def squares(materials, offset=0.0) -> Plant:
+    """One square per material, side by side from x = -1 to 1 about `offset`."""
+    count = len(materials)
+    edge = np.linspace(-1, 1, count + 1)
+    positions = [[[a, -1, 0], [b, -1, 0], [b, 1, 0], [a, 1, 0]] for a, b in pairwise(edge)]
+    faces = 4 * np.arange(count)[:, None, None] + [[0, 1, 2], [0, 2, 3]]
+    return Plant(
+        "squares",
+        np.reshape(positions, (-1, 3)) + offset,
+        np.tile([0, 0, 1.0], (4 * count, 1)),
+        np.tile([[0, 1], [1, 1], [1, 0], [0, 0.0]], (count, 1)),
+        faces.transpose(1, 0, 2).reshape(-1, 3),  # materials alternate in the file
+        np.tile(np.arange(count), 2),
+        tuple(materials),
+    )
+
+
+def drawn(plant: Plant, size=16, **options) -> np.ndarray:
+    with PlantBuffers(plant, **options) as buffers:
+        ctx = buffers.ctx
+        shader = ctx.program(vertex_shader=VERTEX, fragment_shader=FRAGMENT)
+        frame = ctx.simple_framebuffer((size, size))
+        with framebuffer_kept(ctx):
+            frame.use()
+            frame.clear()
+            array = buffers.vertex_array(shader)
+            for group in buffers.groups:
+                buffers.use(group, shader)
+                array.render(moderngl.TRIANGLES, vertices=3 * group.count, first=3 * group.first)
+            pixels = np.frombuffer(frame.read(components=4), np.uint8).reshape(size, size, 4)
+        frame.release()
+        return pixels[::-1].astype(int)
+
+
+def test_vertices_are_relative_to_the_plants_centre():
+    """A map coordinate would leave float32 no millimetres."""
+    plant = squares([Material("m")], offset=5_000_000.0)
+    data = vertex_data(plant, plant.center)
+    assert np.abs(data[:, :2]).max() == pytest.approx(1.0)
+
+
+def test_the_first_ring_under_alpha_0_takes_its_neighbours_colour():
+    image = np.zeros((5, 6, 4), dtype=np.uint8)
+    image[2, 2] = [10, 20, 30, 255]
+    image[2, 4] = [50, 60, 70, 255]
+    bled = bled_under_alpha(image)
+    assert (bled[..., 3] == image[..., 3]).all()
+    assert tuple(bled[1, 1, :3]) == (10, 20, 30)
+    assert tuple(bled[2, 3, :3]) == (30, 40, 50)  # between the two
+    assert tuple(bled[0, 0]) == (0, 0, 0, 0)
+    assert tuple(image[1, 1]) == (0, 0, 0, 0)  # the plant's own image is untouched
+    assert tuple(bled[2, 0, :3]) == (0, 0, 0)
+
+
+@pytest.mark.gl
+def test_every_material_draws_its_own_faces_with_its_factors():
+    red = Texture("red", np.full((2, 2, 4), [255, 0, 0, 255], dtype=np.uint8))
+    plant = squares([Material("a", color_texture=red), Material("b", np.array([0, 0.5, 0, 1.0]))])
+    pixels = drawn(plant)
+    assert (pixels[:, :8] == [255, 0, 0, 255]).all()
+    assert (np.abs(pixels[:, 8:] - [0, 128, 0, 255]) <= 1).all()
+
+
+@pytest.mark.gl
+def test_textures_are_filtered_in_linear_light():
+    """Half way between black and white lies half the light, not sRGB 128 (0.22 of it)."""
+    image = np.zeros((1, 2, 4), dtype=np.uint8)
+    image[..., 3] = 255
+    image[0, 1, :3] = 255
+    pixels = drawn(squares([Material("m", color_texture=Texture("t", image))]), size=65)
+    assert pixels[32, 32, 0] == pytest.approx(127.5, abs=2)
+
+
+@pytest.mark.gl
+def test_cut_out_leaves_keep_their_colour_to_the_edge():
+    image = np.zeros((8, 8, 4), dtype=np.uint8)
+    image[2:6, 2:6] = [200, 100, 50, 255]
+    leaf = Material("m", color_texture=Texture("t", image), alpha_mode="mask")
+    pixels = drawn(squares([leaf]), size=64)
+    shown = pixels[pixels[..., 3] > 0]
+    assert len(shown) == pytest.approx(32 * 32, abs=100)
+    assert (np.abs(shown - shown[0]) <= 1).all()
+
+
+@pytest.mark.gl
+def test_leaving_frees_what_was_made():
+    buffers = PlantBuffers(squares([Material("m")]))
+    with buffers:
+        texture = buffers.groups[0].color_map
+    assert texture.mglo is not None
+    assert type(texture.mglo).__name__ == "InvalidObject"
+    assert buffers.ctx.error == "GL_NO_ERROR"
