@@ -5,14 +5,15 @@ One bad file does not stop the others, and each file's outputs appear whole or n
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from contextlib import nullcontext
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from time import perf_counter
 from typing import Any
 
-from vegtool.convert import ConvertOptions, convert, plan_levels
+from vegtool.convert import ConvertOptions, convert
 from vegtool.errors import InputError, UsageError, VegtoolError
 from vegtool.formats import READERS, ReadOptions, read_plant
 from vegtool.lod import LodChain
@@ -29,10 +30,13 @@ class Job:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a job: the files written and a row per level, or the error."""
+    """What came of a job: files and their bytes, a row per level, notes; or the error.
+
+    After a dry run the files are those that would be written.
+    """
 
     job: Job
-    files: tuple[Path, ...] = ()
+    files: dict[str, int] = field(default_factory=dict)
     levels: tuple[dict[str, Any], ...] = ()
     notes: tuple[str, ...] = ()
     seconds: float = 0.0
@@ -87,28 +91,30 @@ def find_jobs(inputs: Sequence[Path]) -> list[Job]:
 def convert_file(job: Job, task: Task, progress: Progress = silent) -> Outcome:
     """Read one file, convert it, write its levels, its manifest and its contact sheet.
 
+    A dry run does all of it but the writing, so that what it says is exact.
     Raises the errors of reading, converting and writing; then nothing was written.
     """
+    from vegtool.formats.atomic import check_free
+    from vegtool.formats.gltf import file_names, write_chain
+    from vegtool.measure.contact_sheet import contact_sheet
+
     start = perf_counter()
     progress("reading", 0.0)
     plant = read_plant(job.source, task.read)
-    if task.dry_run:
-        rows = tuple(_planned(plan) for plan in plan_levels(plant, task.convert, progress))
-        return Outcome(job, (), rows, plant.notes, perf_counter() - start)
-    from vegtool.formats.gltf import write_chain
-    from vegtool.measure.contact_sheet import contact_sheet
-
+    sheet_name = f"{job.name}.png"
+    names = [*file_names(job.name, 1 + task.convert.levels, task.depth), sheet_name]
+    check_free(task.folder, names, task.force, [job.source])
     chain = convert(plant, task.convert, lambda s, f: progress(s, 0.05 + 0.75 * f))
-    chain = LodChain(job.name, chain.levels, chain.display, chain.seed, chain.options)
+    chain = replace(chain, name=job.name)
     progress("contact sheet", 0.8)
-    sheet = contact_sheet(chain)
+    extra = {sheet_name: contact_sheet(chain)}
     progress("writing", 0.9)
-    files = write_chain(
-        chain, task.folder, task.force, task.depth, {f"{job.name}.png": sheet}, job.source
-    )
+    with TemporaryDirectory() if task.dry_run else nullcontext(task.folder) as folder:
+        paths = write_chain(chain, Path(folder), task.force, task.depth, extra, [job.source])
+        files = {str(task.folder / p.name): p.stat().st_size for p in paths}
     progress("done", 1.0)
-    rows = tuple(_made(chain, i) for i in range(len(chain.levels)))
-    return Outcome(job, tuple(files), rows, plant.notes, perf_counter() - start)
+    rows = tuple(_row(chain, i) for i in range(len(chain.levels)))
+    return Outcome(job, files, rows, plant.notes, perf_counter() - start)
 
 
 def convert_files(
@@ -147,15 +153,7 @@ def _outcome(job: Job, task: Task, progress: Progress = silent) -> Outcome:
         return Outcome(job, error=message, exit_code=1)
 
 
-def _planned(plan: Any) -> dict[str, Any]:
-    return {
-        "billboards": len(plan.billboards),
-        "near_distance_m": plan.near_distance_m,
-        "texels_per_metre": plan.texels_per_metre,
-    }
-
-
-def _made(chain: LodChain, index: int) -> dict[str, Any]:
+def _row(chain: LodChain, index: int) -> dict[str, Any]:
     level = chain.levels[index]
     return {
         "level": index,
@@ -166,8 +164,3 @@ def _made(chain: LodChain, index: int) -> dict[str, Any]:
         "near_distance_m": round(level.near_distance_m, 4),
         "seconds": {k: round(v, 4) for k, v in level.seconds.items()},
     }
-
-
-def default_workers() -> int:
-    """Workers of a batch where none are asked for: one per processor, four at most."""
-    return min(4, os.cpu_count() or 1)

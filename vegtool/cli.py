@@ -100,7 +100,7 @@ def convert_command(
             continue
         for note in outcome.notes:
             console.say(f"{outcome.job.name}: {note}")
-    console.result([_as_json(o) for o in outcomes], _summary(outcomes, console))
+    console.result([_as_json(o) for o in outcomes], _summary(outcomes, dry_run))
     failed = [o for o in outcomes if o.error]
     if len(outcomes) == 1 and failed:
         raise typer.Exit(failed[0].exit_code)
@@ -142,7 +142,7 @@ def inspect_command(
 
 @app.command("doctor")
 def doctor_command(*, json: Json = False) -> None:
-    """Check what this machine can do: drawing, optional parts, and the remedy where one is missing."""
+    """Check what this machine can do, with the remedy where something is missing."""
     from vegtool.doctor import diagnose
 
     checks = diagnose()
@@ -161,7 +161,9 @@ def sample_command(
     out: Annotated[
         Path | None, typer.Option("-o", "--out", help="File to write.", metavar="FILE.glb")
     ] = None,
-    triangles: Annotated[int | None, typer.Option("-t", "--triangles", help="About how many.")] = None,
+    triangles: Annotated[
+        int | None, typer.Option("-t", "--triangles", help="About how many.")
+    ] = None,
     seed: Annotated[int, typer.Option("--seed", help="Another seed, another individual.")] = 0,
     list_: Annotated[bool, typer.Option("--list", help="List the samples.")] = False,
     force: Force = False,
@@ -209,7 +211,7 @@ def _file_progress(todo: list[Any], progress: Any) -> Any:
 def _as_json(outcome: Any) -> dict[str, Any]:
     return {
         "source": str(outcome.job.source),
-        "files": [str(f) for f in outcome.files],
+        "files": outcome.files,
         "levels": list(outcome.levels),
         "notes": list(outcome.notes),
         "seconds": round(outcome.seconds, 3),
@@ -217,18 +219,19 @@ def _as_json(outcome: Any) -> dict[str, Any]:
     }
 
 
-def _summary(outcomes: list[Any], console: Console) -> str:
+def _summary(outcomes: list[Any], dry_run: bool) -> str:
     blocks = []
     for outcome in outcomes:
         if outcome.error:
             continue
         shown = [{k: v for k, v in row.items() if k != "seconds"} for row in outcome.levels]
-        head = list(shown[0])
         rows = [[f"{v:,}" if isinstance(v, int) else v for v in row.values()] for row in shown]
-        title = f"{outcome.job.name}  ({outcome.seconds:.1f} s)"
-        blocks.append(f"{title}\n{table([h.replace('_', ' ') for h in head], rows)}")
-        if outcome.files:
-            blocks[-1] += "\n" + "\n".join(f"  {f}" for f in outcome.files[-3:])
+        head = [name.replace("_", " ") for name in shown[0]]
+        total = human_bytes(sum(outcome.files.values()))
+        title = f"{outcome.job.name}: {outcome.seconds:.1f} s, {total}"
+        title += " would be written" if dry_run else ""
+        files = [f"  {path}  {human_bytes(size)}" for path, size in outcome.files.items()]
+        blocks.append("\n".join([title, table(head, rows), *files]))
     return "\n\n".join(blocks)
 
 
@@ -241,10 +244,15 @@ def run(arguments: list[str] | None = None) -> int:
     """Run the command line and return its exit code; every error is a sentence on stderr."""
     given = sys.argv[1:] if arguments is None else arguments
     try:
-        result = typer.main.get_command(app).main(given, prog_name="vegtool", standalone_mode=False)
-        return result if isinstance(result, int) else 0
+        command = typer.main.get_command(app)
+        code = command.main(given, prog_name="vegtool", standalone_mode=False) or 0
+        if code == INTERRUPTED:
+            raise KeyboardInterrupt
+        return int(code)
     except typer.TyperException as error:
-        print(f"error: {error.format_message()} (vegtool --help lists what there is)", file=sys.stderr)
+        print(
+            f"error: {error.format_message()} (vegtool --help lists what there is)", file=sys.stderr
+        )
         return error.exit_code
     except (KeyboardInterrupt, typer.Abort):
         print("interrupted: nothing is left half-written", file=sys.stderr)
@@ -258,8 +266,8 @@ def run(arguments: list[str] | None = None) -> int:
         if "-vv" in given:
             raise
         print(
-            f"error: vegtool failed on something it does not know ({type(error).__name__}: {error});"
-            " this is a bug: run again with -vv and report what it prints",
+            f"error: vegtool failed in a way that it does not know ({type(error).__name__}:"
+            f" {error}); this is a bug: run again with -vv and report what it prints",
             file=sys.stderr,
         )
         return 1

@@ -12,17 +12,20 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from time import perf_counter
-from typing import get_args
+from typing import TYPE_CHECKING, cast, get_args
 
 from vegtool.arrays import IntArray
-from vegtool.baking import BakeOptions
+from vegtool.baking.options import BakeOptions
 from vegtool.boxes.options import BoxOptions, Shape
 from vegtool.clustering import METHODS, ClusterOptions
 from vegtool.errors import UsageError
-from vegtool.lod import Billboards, Display, Level, LodChain
+from vegtool.lod import Display, Level, LodChain
 from vegtool.options import check_limits, option
 from vegtool.plant import Plant
 from vegtool.progress import Progress, silent
+
+if TYPE_CHECKING:
+    from vegtool.baking.bake import PlantBuffers
 
 LEVEL_RATIO = 3
 """Each level has about a third of the billboards of the one before."""
@@ -40,32 +43,41 @@ class ConvertOptions:
     """What shapes a chain of levels. The command line makes its flags from these fields."""
 
     method: str = option(
-        "kmeans", "How faces are grouped into clusters.", choices=tuple(METHODS), short="-m"
+        "kmeans", "How faces are grouped into clusters.", choices=tuple(METHODS), short="m"
     )
     billboards: int = option(
-        512, "Planes of the first billboard level; crossed shapes count two or three.",
-        least=1, most=100_000, short="-b",
+        512,
+        "Planes of the first billboard level; crossed shapes count two or three.",
+        least=1,
+        most=100_000,
+        short="b",
     )
     levels: int = option(4, "Billboard levels, each for twice the distance.", least=1, most=12)
     orientation_weight: float = option(
         ClusterOptions().orientation_weight,
         "How much clusters follow face orientation, beside position; 0 is the paper's method.",
-        least=0.0, most=100.0,
+        least=0.0,
+        most=100.0,
     )
     shape: str = option(
-        BoxOptions().shape, "Billboards per cluster: by the box's form, one, or crossed.",
+        BoxOptions().shape,
+        "Billboards per cluster: by the box's form, one, or crossed.",
         choices=get_args(Shape),
     )
     max_texture: int = option(
         BakeOptions().max_texture, "Largest side of an atlas, in texels.", least=16, most=16384
     )
     fov: float = option(
-        Display().fov_y_deg, "Vertical field of view that distances are for, in degrees.",
-        least=1.0, most=170.0,
+        Display().fov_y_deg,
+        "Vertical field of view that distances are for, in degrees.",
+        least=1.0,
+        most=170.0,
     )
     image_height: int = option(
-        Display().image_height_px, "Image height that distances are for, in pixels.",
-        least=16, most=32768,
+        Display().image_height_px,
+        "Image height that distances are for, in pixels.",
+        least=16,
+        most=32768,
     )
     seed: int = option(0, "Seed of every random choice.", least=0)
 
@@ -73,18 +85,6 @@ class ConvertOptions:
     def display(self) -> Display:
         """For whom distances are stated."""
         return Display(self.fov, self.image_height)
-
-
-@dataclass(frozen=True, eq=False)
-class LevelPlan:
-    """A level before it is baked: which face is on which billboard, how dense, from how far."""
-
-    labels: IntArray
-    billboards: Billboards
-    texels_per_metre: float
-    near_distance_m: float
-    geometric_error_m: tuple[float, float]
-    seconds: dict[str, float]
 
 
 def convert(
@@ -95,68 +95,70 @@ def convert(
     levels[0] is the plant itself, the others are billboards. Raises UsageError for options out of
     range and CapabilityError where nothing can draw.
     """
-    from vegtool.baking import bake
-    from vegtool.gl.upload import PlantBuffers
+    from vegtool.baking.bake import PlantBuffers
 
     options = options or ConvertOptions()
     check_limits(options)
     levels = [Level("mesh", mesh=plant)]
     counts = billboard_counts(plant, options)
     with PlantBuffers(plant) as buffers:
-        for index, (plan, step) in enumerate(
-            zip(plan_levels(plant, options, progress), counts, strict=False), start=1
-        ):
-            def stage(name: str, fraction: float, index: int = index) -> None:
-                progress(f"LOD{index}: {name}", (index - 1 + 0.5 + 0.5 * fraction) / len(counts))
+        for index, count in enumerate(counts):
 
-            baked = bake(
-                buffers, plan.labels, plan.billboards, plan.texels_per_metre,
-                BakeOptions(max_texture=options.max_texture), stage,
-            )
-            levels.append(
-                Level(
-                    "billboards",
-                    billboards=plan.billboards,
-                    atlas=baked.atlas,
-                    double_sided=baked.double_sided,
-                    texels_per_metre=baked.texels_per_metre,
-                    near_distance_m=plan.near_distance_m,
-                    geometric_error_m=plan.geometric_error_m,
-                    seconds={**plan.seconds, **baked.seconds},
-                )
-            )
+            def report(stage: str, fraction: float, index: int = index) -> None:
+                progress(f"LOD{index + 1}: {stage}", (index + fraction) / len(counts))
+
+            levels.append(billboard_level(buffers, options, index, count, report))
     progress("levels", 1.0)
     return LodChain(plant.name, tuple(levels), options.display, options.seed, asdict(options))
 
 
-def plan_levels(
-    plant: Plant, options: ConvertOptions, progress: Progress = silent
-) -> Iterator[LevelPlan]:
-    """The levels, finest first, without their textures: what `--dry-run` shows."""
+def billboard_level(
+    buffers: PlantBuffers,
+    options: ConvertOptions,
+    index: int,
+    count: int,
+    progress: Progress = silent,
+) -> Level:
+    """One level of at most `count` billboards; `index` 0 is the finest, for the near distance."""
+    from vegtool.baking.bake import bake
     from vegtool.boxes import fit_budget, geometric_error
     from vegtool.clustering import cluster
 
-    cluster_options = ClusterOptions(orientation_weight=options.orientation_weight)
-    box_options = BoxOptions(
-        shape=options.shape, plane="orientation" if options.orientation_weight else "volume"
-    )
-    counts = billboard_counts(plant, options)
-    for index, budget in enumerate(counts):
-        near = near_distance(plant, options.display, index)
-        seconds: dict[str, float] = {}
+    plant, weight = buffers.plant, options.orientation_weight
+    seconds = {"clustering": 0.0, "boxes": 0.0}
 
-        def clusters(count: int, seconds: dict[str, float] = seconds) -> IntArray:
-            with timed(seconds, "clustering"):
-                return cluster(plant, options.method, count, cluster_options, options.seed)
+    def clusters(wanted: int) -> IntArray:
+        with timed(seconds, "clustering"):
+            how = ClusterOptions(orientation_weight=weight)
+            return cluster(plant, options.method, wanted, how, options.seed)
 
-        progress(f"LOD{index + 1}: clustering", index / len(counts))
-        with timed(seconds, "boxes"):
-            labels, billboards = fit_budget(plant, clusters, budget, box_options)
-            error = geometric_error(plant, labels, billboards)
-        seconds["boxes"] -= seconds["clustering"]
-        yield LevelPlan(
-            labels, billboards, options.display.pixels_per_metre(near), near, error, seconds
+    progress("clustering", 0.0)
+    with timed(seconds, "boxes"):
+        box_options = BoxOptions(
+            shape=cast(Shape, options.shape), plane="orientation" if weight else "volume"
         )
+        labels, billboards = fit_budget(plant, clusters, count, box_options)
+        error = geometric_error(plant, labels, billboards)
+    seconds["boxes"] -= seconds["clustering"]
+    near = near_distance(plant, options.display, index)
+    baked = bake(
+        buffers,
+        labels,
+        billboards,
+        options.display.pixels_per_metre(near),
+        BakeOptions(max_texture=options.max_texture),
+        lambda stage, fraction: progress(stage, 0.4 + 0.6 * fraction),
+    )
+    return Level(
+        "billboards",
+        billboards=baked.billboards,
+        atlas=baked.atlas,
+        double_sided=baked.double_sided,
+        texels_per_metre=baked.texels_per_metre,
+        near_distance_m=near,
+        geometric_error_m=error,
+        seconds={**seconds, **baked.seconds},
+    )
 
 
 def billboard_counts(plant: Plant, options: ConvertOptions) -> list[int]:
@@ -171,8 +173,10 @@ def near_distance(plant: Plant, display: Display, level: int) -> float:
     """Metres from which billboard level `level` (0 the finest) may be used."""
     size = float((plant.bounds[1] - plant.bounds[0]).max())
     if size <= 0:
-        raise UsageError(f"{plant.source or plant.name}: expected a plant with an extent, found none")
-    return display.distance_m(NEAR_PIXELS / size) * 2**level
+        raise UsageError(
+            f"{plant.source or plant.name}: expected a plant with an extent, found none"
+        )
+    return float(display.distance_m(NEAR_PIXELS / size) * 2**level)
 
 
 @contextmanager

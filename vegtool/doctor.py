@@ -44,15 +44,13 @@ def _python() -> Check:
 
 
 def _drawing() -> list[Check]:
-    from vegtool.gl.context import describe
+    from vegtool.measure.pictures import renderer
 
     try:
-        about = describe()
+        about = renderer()
     except CapabilityError as error:
         return [Check("drawing", False, "no OpenGL context", str(error), required=True)]
-    return [
-        Check(f"drawing: {name}", True, str(value), required=True) for name, value in about.items()
-    ]
+    return [Check(f"drawing: {name}", True, value, required=True) for name, value in about.items()]
 
 
 def _packages() -> list[Check]:

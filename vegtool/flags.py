@@ -28,7 +28,7 @@ def flags(command: Callable[..., None]) -> Callable[..., None]:
     groups: dict[str, Any] = {}
     for parameter in inspect.signature(command).parameters.values():
         kind = hints[parameter.name]
-        if not is_dataclass(kind):
+        if not (isinstance(kind, type) and is_dataclass(kind)):
             parameters.append(parameter.replace(annotation=kind))
             continue
         groups[parameter.name] = kind
@@ -94,7 +94,9 @@ def read_config(context: typer.Context, path: Path | None) -> Path | None:
     for key, value in values.items():
         name = key.replace("-", "_")
         if name not in known:
-            line = next((i for i, t in enumerate(text.splitlines(), 1) if t.lstrip().startswith(key)), 0)
+            line = next(
+                (i for i, t in enumerate(text.splitlines(), 1) if t.lstrip().startswith(key)), 0
+            )
             choices = ", ".join(sorted(str(k) for k in known))
             raise UsageError(f"{path}, line {line}: no option is called {key!r}; known: {choices}")
         found[name] = value

@@ -82,7 +82,7 @@ class Atlas:
     color: (h, w, 4) uint8, sRGB, straight alpha; alpha is coverage; colour dilated under alpha 0.
     normal: (h, w, 3) uint8, tangent space of the billboard (x along u, y along v, blue > 0.5).
     depth: (h, w) uint16, signed depth along the front normal over the billboard's half_depth:
-    32768 is the plane, 65535 half_depth towards the viewer, 1 half_depth behind; 0 where alpha is 0.
+    32768 is the plane, 65535 half_depth towards the viewer, 1 half_depth behind, 0 nothing.
     front, back: (p, 4) int32 texels x0, y0, width, height (y down from the top row), gutter not
     included. Both pictures have their left edge at -u and their top edge at +v, so the back's is
     the mirror image of what one sees from behind; a back normal's z points along -(u x v).
@@ -141,9 +141,9 @@ class Level:
             raise ValueError("Level: a mesh level needs its mesh")
         if self.kind == "billboards" and (self.billboards is None or self.atlas is None):
             raise ValueError("Level: a billboard level needs billboards and an atlas")
-        if self.billboards is not None and self.atlas is not None:
-            if len(self.atlas.front) != len(self.billboards):
-                raise ValueError("Level: the atlas needs one rectangle per billboard")
+        pair = self.billboards, self.atlas
+        if pair[0] is not None and pair[1] is not None and len(pair[1].front) != len(pair[0]):
+            raise ValueError("Level: the atlas needs one rectangle per billboard")
 
     @property
     def triangles(self) -> int:

@@ -51,8 +51,10 @@ def check_limits(options: Any) -> None:
         if value is None or (least is None and most is None):
             continue
         if (least is not None and not value >= least) or (most is not None and not value <= most):
-            limits = f"{_plain(least)} to {_plain(most)}" if most is not None else (
-                f"at least {_plain(least)}"
+            limits = (
+                f"{_plain(least)} to {_plain(most)}"
+                if most is not None
+                else (f"at least {_plain(least)}")
             )
             raise UsageError(f"{flag}: expected {limits}; got {_plain(value)}")
 
@@ -68,4 +70,10 @@ def default_of(item: Field[Any]) -> Any:
 
 
 def _plain(number: float | None) -> str:
-    return "any" if number is None else f"{number:,.6g}" if isinstance(number, float) else f"{number:,}"
+    return (
+        "any"
+        if number is None
+        else f"{number:,.6g}"
+        if isinstance(number, float)
+        else f"{number:,}"
+    )

@@ -21,7 +21,7 @@ from vegtool.baking.pack import Packing, pack
 from vegtool.baking.sides import compare_sides, opposite_needed, pictures_of, turned
 from vegtool.errors import UsageError
 from vegtool.gl.pictures import Drawn, draw_pictures
-from vegtool.gl.upload import PlantBuffers
+from vegtool.gl.upload import PlantBuffers as PlantBuffers  # for those who bake several levels
 from vegtool.lod import Atlas, Billboards
 from vegtool.plant import Plant
 from vegtool.progress import Progress, silent

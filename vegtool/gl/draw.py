@@ -45,7 +45,7 @@ def draw(
     width, height = size[0] * supersample, size[1] * supersample
     shift = np.eye(4)
     shift[:3, 3] = buffers.origin - target
-    matrix = (view_projection @ shift).T.astype("f4").tobytes()
+    matrix = tuple((view_projection @ shift).T.ravel())
     sun = light.direction / np.linalg.norm(light.direction)
 
     color = ctx.texture((width, height), 4, dtype="f2", samples=samples)
@@ -58,7 +58,7 @@ def draw(
         for group in buffers.groups:
             defines = ("NORMAL_MAP",) if group.normal_map is not None else ()
             shader = program(ctx, "camera.vert", "camera.frag", *defines)
-            shader["view_projection"].write(matrix)
+            shader["view_projection"] = matrix
             shader["sun_direction"] = tuple(sun)
             shader["sun"] = light.sun
             shader["sky"] = (light.sky_above, light.sky_below)

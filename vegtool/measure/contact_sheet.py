@@ -9,13 +9,14 @@ from __future__ import annotations
 from io import BytesIO
 
 import numpy as np
+import numpy.typing as npt
 from PIL import Image, ImageDraw, ImageFont
 
 from vegtool.arrays import ByteArray
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Level, LodChain
 from vegtool.measure.pictures import client_plant, live, over, truth
-from vegtool.measure.views import Camera, direction, framed
+from vegtool.measure.views import direction, framed
 
 CELL = 360
 """Pixels of a picture's side on the sheet; small pictures are magnified to fill it."""
@@ -24,6 +25,8 @@ BACKGROUND = (0.19, 0.27, 0.36)
 """Linear: a light overcast sky, against which both light and dark leaves stand out."""
 PAPER, INK, FAINT = (250, 250, 248), (30, 34, 38), (110, 116, 122)
 VIEW = direction(25.0, 8.0)
+
+Picture = npt.NDArray[np.float32]
 
 
 def contact_sheet(chain: LodChain) -> bytes:
@@ -34,11 +37,9 @@ def contact_sheet(chain: LodChain) -> bytes:
     with PlantBuffers(plant) as original:
         cells = []
         for level in levels:
-            camera = framed(
-                plant.center, plant.radius, VIEW, level.near_distance_m, chain.display
-            )
+            camera = framed(plant.center, plant.radius, VIEW, level.near_distance_m, chain.display)
             with PlantBuffers(client_plant(level), mipmaps=True) as buffers:
-                cells.append((camera, truth(original, camera), live(buffers, camera)))
+                cells.append(_cropped(truth(original, camera), live(buffers, camera)))
     width = MARGIN + len(levels) * (CELL + MARGIN)
     height = 2 * (CELL + MARGIN) + MARGIN + CAPTION + 34
     sheet = Image.new("RGB", (width, height), PAPER)
@@ -46,32 +47,43 @@ def contact_sheet(chain: LodChain) -> bytes:
     title, small = ImageFont.load_default(18), ImageFont.load_default(13)
     heading = f"{chain.name}   {len(plant.faces):,} triangles"
     pen.text((MARGIN, MARGIN), heading, fill=INK, font=title)
-    for column, (level, (camera, above, below)) in enumerate(zip(levels, cells, strict=True)):
+    for column, (level, pictures) in enumerate(zip(levels, cells, strict=True)):
         x, y = MARGIN + column * (CELL + MARGIN), MARGIN + 34
-        for picture in (above, below):
+        for picture in pictures:
             sheet.paste(Image.fromarray(_magnified(over(picture, BACKGROUND))), (x, y))
             y += CELL + MARGIN
-        for row, (text, colour) in enumerate(_caption(level, column + 1, camera)):
+        for row, (text, colour) in enumerate(_caption(level, column + 1)):
             pen.text((x, y + 18 * row), text, fill=colour, font=small)
     stream = BytesIO()
     sheet.save(stream, "PNG", compress_level=4)
     return stream.getvalue()
 
 
+def _cropped(*pictures: Picture) -> tuple[Picture, ...]:
+    """The pictures cut to the same square around all that any of them covers, a little more."""
+    covered = np.logical_or.reduce([p[..., 3] > 0 for p in pictures])
+    rows, columns = np.flatnonzero(covered.any(axis=1)), np.flatnonzero(covered.any(axis=0))
+    if not len(rows):
+        return pictures
+    size = max(int(line[-1] - line[0]) + 1 for line in (rows, columns))
+    side = size + max(2, size // 16)
+    low = [(int(line[0] + line[-1]) + 1 - side) // 2 for line in (rows, columns)]
+    pad = [(max(0, -x), max(0, x + side - n)) for x, n in zip(low, covered.shape, strict=True)]
+    (top, left), ((up, _), (over_left, _)) = low, pad
+    return tuple(
+        np.pad(p, (*pad, (0, 0)))[top + up :, left + over_left :][:side, :side] for p in pictures
+    )
+
+
 def _magnified(picture: ByteArray) -> ByteArray:
-    """Square pictures brought to CELL: whole-number steps where small, averaged where large."""
-    side = picture.shape[0]
-    if side >= CELL:
-        image = Image.fromarray(picture).resize((CELL, CELL), Image.Resampling.BOX)
-        return np.asarray(image)
-    step = CELL // side
-    big = picture.repeat(step, axis=0).repeat(step, axis=1)
-    spare = CELL - big.shape[0]
-    edges = (spare // 2, spare - spare // 2)
-    return np.pad(big, (edges, edges, (0, 0)), mode="edge")
+    """A square picture brought to CELL: averaged where larger, its pixels as squares else."""
+    image = Image.fromarray(picture)
+    if image.width < CELL:
+        image = image.resize((8 * image.width, 8 * image.width), Image.Resampling.NEAREST)
+    return np.asarray(image.resize((CELL, CELL), Image.Resampling.BOX))
 
 
-def _caption(level: Level, number: int, camera: Camera) -> list[tuple[str, tuple[int, int, int]]]:
+def _caption(level: Level, number: int) -> list[tuple[str, tuple[int, int, int]]]:
     assert level.billboards is not None and level.atlas is not None
     height, width = level.atlas.color.shape[:2]
     return [

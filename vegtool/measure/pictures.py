@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vegtool.arrays import ByteArray
+from vegtool.gl.context import describe
 from vegtool.gl.draw import MSAA, Light, draw
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Level, billboard_quads
@@ -22,7 +23,7 @@ def client_plant(level: Level, name: str = "level") -> Plant:
         return level.mesh
     assert level.atlas is not None
     quads = billboard_quads(level)
-    opaque = np.full(level.atlas.normal.shape[:2] + (1,), 255, np.uint8)
+    opaque = np.full((*level.atlas.normal.shape[:2], 1), 255, np.uint8)
     material = Material(
         name,
         color_texture=Texture("color", level.atlas.color),
@@ -33,6 +34,20 @@ def client_plant(level: Level, name: str = "level") -> Plant:
     faces = quads.indices.reshape(-1, 3)
     nothing = np.zeros(len(faces), np.int32)
     return Plant(name, quads.positions, quads.normals, quads.uvs, faces, nothing, (material,))
+
+
+def renderer() -> dict[str, str]:
+    """What draws here: vendor, renderer, version, largest texture side, as words.
+
+    Raises CapabilityError where there is no OpenGL.
+    """
+    about = describe()
+    return {
+        "vendor": about.vendor,
+        "renderer": about.renderer + (" (software)" if about.software else ""),
+        "version": about.version,
+        "largest texture": f"{about.max_texture} texels a side",
+    }
 
 
 def truth(
