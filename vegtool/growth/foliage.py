@@ -7,7 +7,16 @@ import numpy as np
 from vegtool.arrays import FloatArray, IntArray
 from vegtool.growth.mesh import Piece, grid_faces, pile
 from vegtool.growth.species import Foliage
-from vegtool.growth.stems import UP, Stems, across, aim, envelope_at, lay_out, level_side
+from vegtool.growth.stems import (
+    UP,
+    Stems,
+    above_ground,
+    across,
+    aim,
+    envelope_at,
+    lay_out,
+    level_side,
+)
 from vegtool.growth.textures import CELL_MARGIN, CELLS
 
 LARGEST = 4.0  # times its reference size: at a very low detail a crown is allowed to thin out
@@ -30,19 +39,20 @@ def foliage(
     """
     stem, along = lay_out(count, stems.length, kind.along, rng)
     origin, direction, side = stems.at(stem, along)
+    low, high = kind.along
+    share = (along - low) / max(high - low, 1e-9)
     heading = aim(
         direction,
         side,
-        along,
+        share,
         kind.down_angle,
         kind.down_variation,
         kind.rows,
         kind.row_variation,
         rng,
     )
-    low, high = kind.along
     size = 1 + kind.length_variation * rng.uniform(-1, 1, count)
-    size *= envelope_at(kind.envelope, (along - low) / max(high - low, 1e-9))
+    size *= envelope_at(kind.envelope, share)
     length, width = kind.length * size, kind.width * size
     if kind.pointed:
         width = width * min(enlarged, LARGEST)
@@ -86,6 +96,7 @@ def _bend(
         share = droop[:, None] / segments * (0.5 if step == 0 else 1.0)
         tangents[:, step] = tangent
         tangent = np.cos(share) * tangent + np.sin(share) * down
+        tangent = above_ground(tangent, points[:, step])
         points[:, step + 1] = points[:, step] + tangent * (length / segments)[:, None]
     tangents[:, segments] = tangent
     return points, tangents

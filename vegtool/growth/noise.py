@@ -27,7 +27,7 @@ def gradient_noise(points: FloatArray, rng: np.random.Generator) -> FloatArray:
             number = shuffled[(number + cell[:, axis] + step) % TABLE]
             weight *= fade[:, axis] if step else 1 - fade[:, axis]
         total += weight * np.einsum("ij,ij->i", gradients[number], place - np.array(corner))
-    return total * (2 / np.sqrt(dimension))
+    return np.asarray(total * (2 / np.sqrt(dimension)))
 
 
 def octaves(points: FloatArray, count: int, gain: float, rng: np.random.Generator) -> FloatArray:

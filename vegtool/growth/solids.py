@@ -149,8 +149,8 @@ def height_field(triangles: int | None, seed: int) -> Plant:
     bent = ground + 0.04 * np.stack(
         [octaves(ground * 5, 2, 0.5, rng), octaves(ground * 5, 2, 0.5, rng)], axis=1
     )
-    ridges = 1.0 - np.abs(octaves(bent * 2.2, 5, 0.45, rng))
-    height = 26.0 * ridges**2 + 9.0 * octaves(ground * 3.0, 7, 0.5, rng)
+    ridges = 1.0 - np.abs(octaves(bent * 1.5, 4, 0.35, rng))
+    height = 20.0 * ridges**2 + 4.0 * octaves(ground * 3.0, 7, 0.45, rng)
     height -= height.mean()
     # Rows run away from a viewer who looks along -z, so that faces turn upward.
     positions = np.stack([(across - 0.5) * TERRAIN, height, (0.5 - back) * TERRAIN], axis=1)

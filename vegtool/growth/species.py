@@ -33,7 +33,7 @@ class StemLevel:
     envelope: tuple[float, ...] = (1.0,)
     """Relative length, evenly spaced from the lowest to the highest place on the parent."""
     down_angle: tuple[float, float] = (50.0, 40.0)
-    """Angle to the parent at its base and at its tip."""
+    """Angle to the parent for the lowest and the highest of them."""
     down_variation: float = 8.0
     rows: int = 0
     """0: spiral by the golden angle; 2: alternating left and right of the parent."""
@@ -138,7 +138,8 @@ def parse_species(text: str, source: str) -> Species:
         values["stems"] = tuple(_build(StemLevel, entry) for entry in values.get("stems", ()))
         values["foliage"] = tuple(_build(Foliage, entry) for entry in values.get("foliage", ()))
         values["bark"] = _build(Bark, values.get("bark", {}))
-        return _build(Species, values)
+        species: Species = _build(Species, values)
+        return species
     except (tomllib.TOMLDecodeError, TypeError, ValueError) as error:
         raise InputError(f"{source}: not a species file: {error}") from error
 

@@ -87,25 +87,36 @@ def lay_out(
 def aim(
     direction: FloatArray,
     side: FloatArray,
-    t: FloatArray,
+    share: FloatArray,
     down_angle: tuple[float, float],
     down_variation: float,
     rows: int,
     row_variation: float,
     rng: np.random.Generator,
 ) -> FloatArray:
-    """(n, 3) unit directions in which children leave a parent of that direction and side."""
-    n = len(t)
+    """(n, 3) unit directions in which children leave a parent of that direction and side.
+
+    share: (n,) from the lowest to the highest place where children start, 0 to 1.
+    """
+    n = len(share)
     order = np.arange(n)
     if rows:
         turn = order % rows * (360.0 / rows) + rng.normal(0, row_variation, n)
     else:
         turn = order * GOLDEN_ANGLE + rng.normal(0, 10.0, n)
     turn = np.radians(turn)[:, None]
-    down = down_angle[0] + (down_angle[1] - down_angle[0]) * t + rng.normal(0, down_variation, n)
+    down = (
+        down_angle[0] + (down_angle[1] - down_angle[0]) * share + rng.normal(0, down_variation, n)
+    )
     down = np.radians(down)[:, None]
     outward = np.cos(turn) * side + np.sin(turn) * np.cross(side, direction)
     return unit(np.cos(down) * direction + np.sin(down) * outward)
+
+
+def above_ground(direction: FloatArray, point: FloatArray) -> FloatArray:
+    """The directions (n, 3), level where they would lead on below the ground from points (n, 3)."""
+    low = (point[:, 1] <= 0) & (direction[:, 1] < 0)
+    return unit(np.where(low[:, None], direction * np.array([1.0, 0.0, 1.0]), direction))
 
 
 def envelope_at(envelope: tuple[float, ...], share: FloatArray) -> FloatArray:
@@ -149,7 +160,7 @@ def next_stems(level: StemLevel, parents: Stems, rng: np.random.Generator) -> St
     heading = aim(
         direction,
         side,
-        along,
+        share,
         level.down_angle,
         level.down_variation,
         level.rows,
@@ -183,6 +194,7 @@ def _grow(
         direction = unit(
             direction + (curve + bend[0]) * upward + bend[1] * side + (level.tropism / STEPS) * UP
         )
+        direction = above_ground(direction, points[:, step])
         side = across(side, direction)
         points[:, step + 1] = points[:, step] + direction * (length / STEPS)[:, None]
         sides[:, step + 1] = side

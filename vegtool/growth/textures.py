@@ -7,6 +7,8 @@ alpha 0, so that no dark rim shows where a client filters.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from vegtool.arrays import ByteArray, FloatArray
@@ -24,9 +26,9 @@ def bark_textures(bark: Bark) -> tuple[Texture, Texture]:
     rng = generator(0, "bark", *bark.colors)
     coarse = tileable_noise(SIZE, 5.0 * np.sqrt(bark.stretch), 5.0 / np.sqrt(bark.stretch), rng)
     middle = tileable_noise(SIZE, 14.0 * np.sqrt(bark.stretch), 14.0 / np.sqrt(bark.stretch), rng)
-    fine = tileable_noise(SIZE, 50.0, 35.0, rng)
+    fine = tileable_noise(SIZE, 70.0, 40.0, rng)
     furrow = np.abs(coarse + 0.45 * middle)
-    height = np.clip(1.0 - np.exp(-2.2 * furrow), 0, 1) + 0.10 * fine
+    height = np.clip(1.0 - np.exp(-2.2 * furrow), 0, 1) + 0.06 * fine
     height = (height - height.min()) / np.ptp(height)
     shade = np.clip(1.15 * height + 0.1 * fine + 0.06 * middle, 0, 1)[..., None]
     dark, light = (srgb_of(c) for c in bark.colors)
@@ -152,7 +154,7 @@ def draw_broad_twig(canvas: Canvas, kind: Foliage, rng: np.random.Generator) -> 
     tip = 0.58
     at = np.linspace(0, 1, 7)
     spine = np.stack([sway * np.sin(np.pi * at), at * tip], axis=1)
-    for start, end in zip(spine[:-1], spine[1:], strict=True):
+    for start, end in pairwise(spine):
         draw_stalk(canvas, start, end, 0.014, stalk)
     pairs = kind.leaves - 1
     for number in range(pairs):
@@ -209,7 +211,7 @@ def draw_flower(canvas: Canvas, kind: Foliage, rng: np.random.Generator) -> None
         angle = turn + 2 * np.pi * number / kind.leaves + rng.normal(0, 0.05)
         draw_leaf(canvas, plain, (0.0, 0.5), float(angle), 0.47 * rng.uniform(0.92, 1.0), rng)
     centre = np.array([0.0, 0.5])
-    draw_stalk(canvas, centre, centre + [0.0, 1e-3], 0.22, heart)
+    draw_stalk(canvas, centre, centre + np.array([0.0, 1e-3]), 0.22, heart)
 
 
 def draw_blade(canvas: Canvas, kind: Foliage, rng: np.random.Generator) -> None:
