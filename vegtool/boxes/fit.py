@@ -21,7 +21,7 @@ from vegtool.boxes.box import MIN_EXTENT, Boxes
 from vegtool.boxes.groups import Groups
 from vegtool.boxes.options import BoxOptions
 
-BLOCK = 1024
+BLOCK = 512
 """Points whose extremes are sought together: their products stay in the processor's cache."""
 LEAST_SPREAD = 1e-6
 """Standard deviation, as a fraction of the largest, below which a cluster counts as flat there."""
@@ -131,12 +131,19 @@ def extreme_rows(points: npt.NDArray[np.float32]) -> npt.NDArray[np.intp]:
 
 
 def even_directions(count: int) -> FloatArray:
-    """Unit vectors (count, 3) spread evenly over half a sphere, on a golden spiral."""
-    i = np.arange(count) + 0.5
-    z = 1 - i / count
-    turn = np.pi * (1 + 5**0.5) * i
+    """About `count` unit vectors (n, 3), spread evenly over half a sphere, mirrored in two axes.
+
+    A golden spiral fills one octant and its mirror images the others: which way the principal axes
+    point, a matter of chance, does not change the box.
+    """
+    octant = -(-count // 4)
+    i = np.arange(octant) + 0.5
+    z = 1 - i / octant
+    turn = np.pi / 2 * (i * (1 + 5**0.5) / 2 % 1)
     r = np.sqrt(1 - z * z)
-    return np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1)
+    first = np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1)
+    mirrors = np.array([[1, 1, 1], [-1, 1, 1], [1, -1, 1], [-1, -1, 1]])
+    return np.asarray((mirrors[:, None] * first).reshape(-1, 3))
 
 
 def search(support: list[FloatArray], steps_deg: tuple[float, ...]) -> FloatArray:
@@ -219,5 +226,5 @@ NEIGHBOURS = np.array([n for n in product((-1.0, 0.0, 1.0), repeat=3) if any(n)]
 _angles = np.radians([0.0, -22.5, 22.5, -45.0, 45.0])
 START_GRID = rotations(np.array(list(product(_angles, repeat=3))))
 """(125, 3, 3) rotations about the principal axes; the first one is none."""
-DIRECTIONS = even_directions(64).astype(np.float32)
-"""(64, 3) directions in which the extreme points are sought, at both ends."""
+DIRECTIONS = even_directions(96).astype(np.float32)
+"""(96, 3) directions in which the extreme points are sought, at both ends."""
