@@ -18,10 +18,11 @@ from vegtool.branches.tubes import Tubes
 
 NEIGHBOURS = 24  # samples looked at in each class of thickness
 HOSTS = 8  # of which so many tubes are kept
-REACH = 3.0  # start radii: wider gaps are bridged only within REACH_FRACTION
-REACH_FRACTION = 0.05  # of the plant's radius
-THIN = 0.25  # what a host counts that is thinner than the branch by all of its radius
-BESIDE = 0.5  # what it counts to start beside the host's own start, within its radius
+REACH = 3.0  # start radii: the widest gap that is bridged, or else
+REACH_FRACTION = 0.02  # of the plant's radius
+THIN = 0.25  # what it counts if the host there is thinner than the branch by all of its radius
+BESIDE = 0.5  # what it counts to start beside the host's own start: within its radius there
+ASIDE = 2.0  # and so many times the gap
 ON_AXIS = 1e-4  # of the host's radius: so near its axis that no chance has put it there, and
 # neither of those two counts
 AT_START = 1e-6  # of the plant's radius: no tube grows from the very start of another
@@ -64,8 +65,8 @@ def _offers(
     depth = np.minimum(distance / np.maximum(thickness, np.finfo(float).eps), 1)
     off_axis = depth > ON_AXIS
     thin = THIN * np.maximum(1 - thickness / radius, 0) * off_axis
-    beside = (along < thickness) & off_axis
-    allowed = (along > AT_START) | (beside & (depth < 1))
+    beside = (along < thickness + ASIDE * gap) & off_axis
+    allowed = np.where(beside, gap <= 0, along > AT_START)
     allowed &= gap <= np.maximum(REACH * radius, REACH_FRACTION)
     row, column = np.nonzero(allowed)
     child, host = orphans[row], host[row, column]
