@@ -34,7 +34,7 @@ def resolve_branches(
     """
     if declared is None or (face_branch < 0).all():
         return None
-    wood = ~plant.face_is_leaf
+    wood = ~plant.face_is_leaf if not plant.face_is_leaf.all() else np.ones(len(face_branch), bool)
     if declared.parent is None and declared.level is None:
         notes.append("the file names branches but not how they hang together; ignored")
         return None

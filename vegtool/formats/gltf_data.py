@@ -188,7 +188,8 @@ def open_gltf(path: Path) -> GltfFile:
             f"{path}: expected glTF's JSON, found text that is not ({error}); export it again"
         ) from None
     file = GltfFile(path, tree if isinstance(tree, dict) else {}, binary)
-    version = str(file.json.get("asset", {}).get("version", "none"))
+    asset = file.json.get("asset")
+    version = str(asset.get("version", "none")) if isinstance(asset, dict) else "none"
     if not version.startswith("2."):
         raise InputError(
             f"{path}: expected glTF version 2, found {version}; convert it, for example with "

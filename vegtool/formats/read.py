@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from vegtool.arrays import FloatArray, unit
 from vegtool.errors import InputError
@@ -20,8 +23,10 @@ from vegtool.formats.clean import (
 from vegtool.formats.declared import resolve_branches
 from vegtool.formats.parts import IndexArray, Parsed, Part
 from vegtool.formats.roles import guess_role, named_roles
-from vegtool.formats.upright import UPRIGHT, guess_up
+from vegtool.formats.upright import UPRIGHT, guess_up, turned
 from vegtool.plant import Material, Plant
+
+Mask = npt.NDArray[np.bool_]
 
 MAX_FACES = 30_000_000
 """More than that is a landscape, or an attack by instances of instances."""
@@ -62,8 +67,8 @@ def assemble(parsed: Parsed, path: Path, options: ReadOptions) -> Plant:
     mesh, materials = _only_used_materials(mesh, parsed.materials)
     plant = Plant(
         name=parsed.name,
-        positions=(mesh.positions @ turn.T + turn @ mesh.origin) * options.metres,
-        normals=mesh.normals @ turn.T,
+        positions=turned(mesh.positions + mesh.origin, turn) * options.metres,
+        normals=turned(mesh.normals, turn),
         uvs=mesh.uvs,
         colors=mesh.colors,
         faces=mesh.faces.astype(np.int32),
@@ -120,7 +125,7 @@ def _join(parts: list[Part], path: Path) -> _Mesh:
 
 def _drop_broken_faces(mesh: _Mesh, path: Path, notes: list[str]) -> _Mesh:
     """Without faces that use broken coordinates, have no area or repeat another."""
-    usable = np.isfinite(mesh.positions).all(axis=1)
+    usable: Mask = np.asarray(np.isfinite(mesh.positions).all(axis=1))
     laid = np.asarray((np.abs(np.nan_to_num(mesh.uvs, nan=np.inf)) < WIDEST_UV).all(axis=1))
     if not laid.all():
         notes.append(f"set {(~laid).sum()} NaN or infinite texture coordinates to 0")
@@ -131,13 +136,13 @@ def _drop_broken_faces(mesh: _Mesh, path: Path, notes: list[str]) -> _Mesh:
         uvs=np.where(laid[:, None], mesh.uvs, 0.0),
     )
     found = {}
-    steps = (
-        ("with NaN or infinite coordinates", lambda m: ~usable[m.faces].all(axis=1)),
+    steps: tuple[tuple[str, Callable[[_Mesh], Mask]], ...] = (
+        ("with NaN or infinite coordinates", lambda m: np.asarray(~usable[m.faces].all(axis=1))),
         ("without area", lambda m: flat_faces(m.positions, m.faces)),
         ("repeated", lambda m: repeated_faces(m.positions, m.uvs, m.faces, m.material)),
     )
     for what, broken in steps:
-        drop = broken(mesh)
+        drop: Mask = broken(mesh)
         if drop.any():
             found[what] = int(drop.sum())
             notes.append(f"dropped {found[what]} of {total} faces {what}")
@@ -206,19 +211,21 @@ def _with_roles(
         roles = named_roles(materials, options.leaf_materials, str(path))
     else:
         roles = [
-            guess_role(material, *_worn(mesh, parts, index))
+            guess_role(
+                material, _wearers(mesh, parts, index), partial(_faces_per_point, mesh, index)
+            )
             for index, material in enumerate(materials)
         ]
     return tuple(replace(m, role=r) for m, r in zip(materials, roles, strict=True))
 
 
-def _worn(mesh: _Mesh, parts: list[Part], material: int) -> tuple[set[str], float]:
-    """Names of the parts that wear a material, and its faces per distinct point."""
+def _wearers(mesh: _Mesh, parts: list[Part], material: int) -> set[str]:
+    """Names of the parts that wear a material."""
+    return {parts[k].name for k in np.unique(mesh.part[mesh.material == material])}
+
+
+def _faces_per_point(mesh: _Mesh, material: int) -> float:
+    """Faces of a material per distinct point."""
     worn = mesh.material == material
-    names = {parts[k].name for k in np.unique(mesh.part[worn])}
-    vertices = np.unique(mesh.faces[worn])
-    return names, worn.sum() / len(np.unique(mesh.positions[vertices] @ _SPREAD))
-
-
-_SPREAD = np.array([1.0, np.sqrt(2.0), np.pi])
-"""Tells points apart by one number each."""
+    points = mesh.positions[np.unique(mesh.faces[worn])]
+    return float(worn.sum() / len(np.unique(points, axis=0)))

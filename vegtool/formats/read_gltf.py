@@ -20,6 +20,7 @@ from vegtool.formats.gltf_data import GltfFile, meshopt_missing, open_gltf
 from vegtool.formats.gltf_material import UvSource, read_materials
 from vegtool.formats.gltf_nodes import Node, scene_nodes
 from vegtool.formats.parts import Declared, IndexArray, Parsed, Part
+from vegtool.formats.upright import turned
 from vegtool.formats.vertex_colors import settle_colors
 
 UNDERSTOOD = {
@@ -305,8 +306,8 @@ def _moved(part: Part, matrix: FloatArray) -> Part:
     mirrored = np.linalg.det(linear) < 0
     cofactors = np.cross(linear[[1, 2, 0]], linear[[2, 0, 1]]) * (-1 if mirrored else 1)
     with np.errstate(invalid="ignore", over="ignore"):  # broken coordinates, dropped later
-        positions = part.positions @ linear.T + matrix[:3, 3]
-        normals = None if part.normals is None else part.normals @ cofactors.T
+        positions = turned(part.positions, linear) + matrix[:3, 3]
+        normals = None if part.normals is None else turned(part.normals, cofactors)
     return replace(
         part,
         positions=positions,

@@ -7,6 +7,7 @@ its colour, and last its shape: cards have fewer faces than points, tubes about 
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from fnmatch import fnmatchcase
 
 import numpy as np
@@ -24,8 +25,8 @@ WOOD_WORDS = re.compile(
 )
 GREENNESS = 1.08
 """Green at least this many times red and blue (linear) is a leaf's colour."""
-CARD_FACES_PER_POINT = 1.2
-"""Below: cards (0.5 for a quad) or single blades; above: closed tubes (2) and blobs."""
+CARD_FACES_PER_POINT = 0.95
+"""Below: cards (0.5 for a quad) and blades; from 1 up: tubes (2, or 1 for a single segment)."""
 
 
 def role_from_name(name: str) -> Role | None:
@@ -37,8 +38,8 @@ def role_from_name(name: str) -> Role | None:
     return "leaf" if leaf else "wood"
 
 
-def guess_role(material: Material, wearers: set[str], faces_per_point: float) -> Role:
-    """The role of a material worn by parts of these names with that shape."""
+def guess_role(material: Material, wearers: set[str], faces_per_point: Callable[[], float]) -> Role:
+    """The role of a material worn by parts of these names; its shape is asked for last."""
     by_name = role_from_name(material.name)
     if by_name:
         return by_name
@@ -52,7 +53,7 @@ def guess_role(material: Material, wearers: set[str], faces_per_point: float) ->
     red, green, blue = mean_color(material)
     if green > GREENNESS * max(red, blue):
         return "leaf"
-    return "leaf" if faces_per_point < CARD_FACES_PER_POINT else "wood"
+    return "leaf" if faces_per_point() < CARD_FACES_PER_POINT else "wood"
 
 
 def named_roles(materials: list[Material], patterns: tuple[str, ...], source: str) -> list[Role]:

@@ -25,6 +25,13 @@ NARROW = 0.35
 """A foot is narrower than this fraction of the plant."""
 
 
+def turned(vectors: FloatArray, matrix: FloatArray) -> FloatArray:
+    """(n, 3) vectors times a (3, 3) matrix, to the same bits for any number of threads."""
+    if np.array_equal(matrix, np.eye(3)):
+        return vectors
+    return np.asarray(np.einsum("vj,ij->vi", vectors, matrix))
+
+
 def guess_up(positions: FloatArray, faces: IndexArray, notes: list[str]) -> str:
     """y or z: the axis along which the plant stands on 0, else on a narrow foot, else y.
 
