@@ -1,6 +1,7 @@
 // three.js in headless Chromium: opens .glb files with GLTFLoader and draws them.
-// stdin: {size, views: [[x, y, z], ...], jobs: [{file, center, radius}, ...]}
-//   size: pixels of the square image, a multiple of 8; views: directions from the centre to the camera.
+// stdin: {size, views: [[x, y, z], ...], jobs: [{file, center, radius, samples}, ...]}
+//   size: pixels of the square image, a multiple of 8; samples: drawn that many times as large,
+//   then averaged; views: directions from the centre to the camera.
 // stdout: one JSON object per line and job,
 //   {file, triangles, textures, complaints, silhouettes: [base64, one per view]}
 //   or {file, error, complaints}. A silhouette is size * size bits, top row first, highest bit
@@ -31,10 +32,11 @@ const renderer = new THREE.WebGLRenderer({alpha: true, antialias: false});
 renderer.setPixelRatio(1);
 renderer.setSize(size, size);
 renderer.setClearColor(0x000000, 0);
-const target = new THREE.WebGLRenderTarget(size, size);
-const alphas = new Uint8Array(4 * size * size);
 
-function silhouette(scene, direction, center, radius) {
+function silhouette(scene, direction, center, radius, samples) {
+  const wide = size * samples;
+  const target = new THREE.WebGLRenderTarget(wide, wide);
+  const pixels = new Uint8Array(4 * wide * wide);
   const camera = new THREE.PerspectiveCamera(FOV, 1, radius / 100, radius * 10);
   const distance = radius / Math.sin(THREE.MathUtils.degToRad(FOV / 2));
   const away = new THREE.Vector3(...direction).normalize();
@@ -44,16 +46,19 @@ function silhouette(scene, direction, center, radius) {
   renderer.setRenderTarget(target);
   renderer.clear();
   renderer.render(scene, camera);
-  renderer.readRenderTargetPixels(target, 0, 0, size, size, alphas);
-  const bits = new Uint8Array(size * size / 8);
-  for (let i = 0; i < size * size; i++) {
-    const row = size - 1 - Math.floor(i / size);  // GL's first row is the lowest
-    if (alphas[4 * (row * size + i % size) + 3] >= 128) bits[i >> 3] |= 128 >> (i & 7);
+  renderer.readRenderTargetPixels(target, 0, 0, wide, wide, pixels);
+  target.dispose();
+  const alpha = new Float64Array(size * size);
+  for (let i = 0; i < wide * wide; i++) {
+    const row = Math.floor((wide - 1 - Math.floor(i / wide)) / samples);  // GL starts at the bottom
+    alpha[row * size + Math.floor(i % wide / samples)] += pixels[4 * i + 3] / samples ** 2;
   }
+  const bits = new Uint8Array(size * size / 8);
+  alpha.forEach((value, i) => { if (value >= 127.5) bits[i >> 3] |= 128 >> (i & 7); });
   return btoa(String.fromCharCode(...bits));
 }
 
-window.draw = async ({url, center, radius}) => {
+window.draw = async ({url, center, radius, samples}) => {
   const {scene: model} = await new GLTFLoader().loadAsync(url);
   const scene = new THREE.Scene();
   scene.add(model, new THREE.HemisphereLight(0xffffff, 0x888888, 3));
@@ -65,7 +70,7 @@ window.draw = async ({url, center, radius}) => {
     for (const value of Object.values(node.material)) if (value?.isTexture) textures.add(value);
   });
   const middle = new THREE.Vector3(...center);
-  const silhouettes = views.map((view) => silhouette(scene, view, middle, radius));
+  const silhouettes = views.map((view) => silhouette(scene, view, middle, radius, samples));
   model.traverse((node) => { if (node.isMesh) { node.geometry.dispose(); node.material.dispose(); } });
   for (const texture of textures) texture.dispose();
   return {triangles, textures: textures.size, silhouettes};
@@ -78,6 +83,7 @@ const server = http.createServer((request, response) => {
   const url = decodeURIComponent(request.url.split('?')[0]);
   const send = (type, body) => response.setHeader('content-type', type).end(body);
   if (url === '/') return send('text/html', page);
+  if (url === '/favicon.ico') return response.writeHead(204).end();
   if (url === '/page.js') return send('text/javascript', script);
   const job = url.match(/^\/job\/(\d+)$/);
   const file = job ? jobs[job[1]].file : path.join(folder, url.replace(/^\/packages\//, ''));
@@ -109,11 +115,11 @@ try {
   });
   await tab.goto(`http://127.0.0.1:${server.address().port}/`);
   await tab.waitForFunction('window.ready', {timeout: 60_000});
-  for (const [index, {file, center, radius}] of jobs.entries()) {
+  for (const [index, {file, ...camera}] of jobs.entries()) {
     complaints.length = 0;
     try {
       const drawn = await tab.evaluate((job) => window.draw(job), {
-        url: `/job/${index}`, center, radius,
+        url: `/job/${index}`, ...camera,
       });
       console.log(JSON.stringify({file, ...drawn, complaints}));
     } catch (error) {

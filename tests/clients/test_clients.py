@@ -36,7 +36,9 @@ BROWSERS = (
 BROWSER = next(filter(None, map(shutil.which, filter(None, BROWSERS))), None)
 
 SIZE = 256  # pixels; the first billboard level is made for a plant about this large
+SAMPLES_OF_ORIGINAL = 3  # along each side of a pixel: a live original loses leaves to mip-mapping
 VIEWS = [[1, 0.2, 0], [0, 0.2, 1], [-1, 0.2, 0], [0, 0.2, -1], [1, 1, 1], [0, 1, 0.01]]
+LEAST_AREA = 100  # pixels of the original: a card seen from its edge has no silhouette to compare
 LEAST_OVERLAP = 0.5  # intersection over union of the silhouettes of original and level 1
 LEAST_COVER = 0.25  # of the original's silhouette, for a coarser level to count as the plant
 SAME_MODEL = 0.95  # intersection over union of the user's own file and level 0
@@ -59,15 +61,32 @@ pytestmark = [
 ]
 
 
-def model_files() -> list[Path]:
-    """The real plants, where their folder is here."""
-    return sorted(p for p in MODELS.rglob("*") if p.suffix.lower() in READERS)
+def sources() -> dict[str, Path | None]:
+    """The real plants where their folder is here, else our own samples (still to be written)."""
+    models = sorted(p for p in MODELS.rglob("*") if p.suffix.lower() in READERS)
+    if models:
+        return {str(path.relative_to(MODELS)): path for path in models}
+    return {f"sample {name}": None for name in SAMPLES}
 
 
-SOURCES = [
-    *(f"models/{p.relative_to(MODELS)}" for p in model_files()),
-    *map("sample {}".format, SAMPLES),
-]
+SOURCES = sources()
+
+
+def stands_for_itself(path: Path | None) -> bool:
+    """Whether three.js draws a user's file as vegtool reads it: no blending, no extensions."""
+    if path is None or path.suffix != ".glb":
+        return False
+    gltf = gltf_json(path)
+    blended = any(m.get("alphaMode") == "BLEND" for m in gltf.get("materials", []))
+    return not blended and not gltf.get("extensionsUsed")
+
+
+def gltf_json(file: Path) -> dict[str, Any]:
+    """The JSON chunk of a .glb file."""
+    data = file.read_bytes()
+    (length,) = struct.unpack_from("<I", data, 12)
+    result: dict[str, Any] = json.loads(data[20 : 20 + length])
+    return result
 
 
 @dataclass(frozen=True)
@@ -111,16 +130,17 @@ def node(script: str, job: Any) -> list[dict[str, Any]]:
 
 @pytest.fixture(scope="session")
 def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Written]:
-    """Every model and every sample, converted with all defaults."""
+    """Every model, converted with all defaults by one command."""
     folder = tmp_path_factory.mktemp("clients")
-    samples = {f"sample {name}": folder / "samples" / f"{name}.glb" for name in SAMPLES}
-    for name, path in zip(SAMPLES, samples.values(), strict=True):
-        vegtool("sample", name, "-o", path, "-q")
-    models = {f"models/{p.relative_to(MODELS)}": p for p in model_files()}
-    sources = {**models, **samples}
-    printed = vegtool("convert", *sources.values(), "-o", folder / "out", "-j", "2", "--json", "-q")
+    paths: dict[str, Path] = {}
+    for name, path in SOURCES.items():
+        sample = name.removeprefix("sample ")
+        paths[name] = path or folder / "samples" / f"{sample}.glb"
+        if path is None:
+            vegtool("sample", sample, "-o", paths[name], "-q")
+    printed = vegtool("convert", *paths.values(), "-o", folder / "out", "-j", "2", "--json", "-q")
     outcomes = {Path(outcome["source"]): outcome for outcome in json.loads(printed)}
-    return {name: _written(path, outcomes[path]) for name, path in sources.items()}
+    return {name: _written(path, outcomes[path]) for name, path in paths.items()}
 
 
 def _written(source: Path, outcome: dict[str, Any]) -> Written:
@@ -141,12 +161,12 @@ def validated(written: dict[str, Written]) -> dict[Path, dict[str, Any]]:
 def drawn(written: dict[str, Written]) -> dict[Path, dict[str, Any]]:
     """Every file as three.js draws it, seen like its original; silhouettes are (views, h, w)."""
     jobs = []
-    for each in written.values():
+    for name, each in written.items():
         center, radius = frame(each.combined)
-        own = [each.source] if each.source.suffix == ".glb" else []
-        jobs += [
-            {"file": str(file), "center": center, "radius": radius} for file in (*each.files, *own)
-        ]
+        originals = [each.combined, *([each.source] if stands_for_itself(SOURCES[name]) else [])]
+        for file in (*originals, *each.levels):
+            samples = SAMPLES_OF_ORIGINAL if file in originals else 1
+            jobs.append({"file": str(file), "center": center, "radius": radius, "samples": samples})
     answers = node("open_in_three.mjs", {"size": SIZE, "views": VIEWS, "jobs": jobs})
     for answer in answers:
         packed = [base64.b64decode(s) for s in answer.get("silhouettes", [])]
@@ -157,9 +177,7 @@ def drawn(written: dict[str, Written]) -> dict[Path, dict[str, Any]]:
 
 def frame(file: Path) -> tuple[list[float], float]:
     """Centre and radius (metres) of what a combined file shows, from its own bounds."""
-    data = file.read_bytes()
-    (length,) = struct.unpack_from("<I", data, 12)
-    gltf = json.loads(data[20 : 20 + length])
+    gltf = gltf_json(file)
     shown = gltf["nodes"][gltf["scenes"][gltf["scene"]]["nodes"][0]]
     primitives = gltf["meshes"][shown["mesh"]]["primitives"]
     positions = [gltf["accessors"][p["attributes"]["POSITION"]] for p in primitives]
@@ -169,9 +187,11 @@ def frame(file: Path) -> tuple[list[float], float]:
     return center.tolist(), float(np.linalg.norm(high - low) / 2)
 
 
-def overlap(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """(views,): intersection over union of silhouettes."""
-    return (a & b).sum(axis=(1, 2)) / np.maximum((a | b).sum(axis=(1, 2)), 1)
+def overlap(original: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Intersection over union of silhouettes, for the views in which the original has one."""
+    seen = original.sum(axis=(1, 2)) >= LEAST_AREA
+    original, other = original[seen], other[seen]
+    return (original & other).sum(axis=(1, 2)) / (original | other).sum(axis=(1, 2))
 
 
 @pytest.mark.parametrize("source", SOURCES)
@@ -185,14 +205,15 @@ def test_the_validator_finds_no_error_and_no_warning(source, written, validated)
 
 @pytest.mark.parametrize("source", SOURCES)
 def test_three_opens_and_draws_every_file(source, written, drawn):
-    original = drawn[written[source].combined]
-    area = original["silhouettes"].sum(axis=(1, 2))
+    area = drawn[written[source].combined]["silhouettes"].sum(axis=(1, 2))
+    seen = area >= LEAST_AREA
+    assert seen.any()
     for file in written[source].files:
         answer = drawn[file]
-        assert "error" not in answer, (file.name, answer)
+        assert "error" not in answer, (file.name, answer["error"])
         assert answer["complaints"] == [], file.name
-        cover = answer["silhouettes"].sum(axis=(1, 2)) / area
-        assert cover.min() > LEAST_COVER, (file.name, cover)
+        cover = answer["silhouettes"].sum(axis=(1, 2))[seen] / area[seen]
+        assert cover.min() >= LEAST_COVER, (file.name, cover)
 
 
 @pytest.mark.parametrize("source", SOURCES)
@@ -202,7 +223,7 @@ def test_level_1_has_the_silhouette_of_the_original(source, written, drawn):
     assert shares.min() >= LEAST_OVERLAP, shares
 
 
-@pytest.mark.parametrize("source", [s for s in SOURCES if s.endswith(".glb")])
+@pytest.mark.parametrize("source", [n for n, path in SOURCES.items() if stands_for_itself(path)])
 def test_the_combined_file_shows_what_the_users_own_file_shows(source, written, drawn):
     own, combined = written[source].source, written[source].combined
     shares = overlap(drawn[own]["silhouettes"], drawn[combined]["silhouettes"])
