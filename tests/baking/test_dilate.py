@@ -5,8 +5,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vegtool.baking.dilate import nearest_covered, owners
+from vegtool.baking.dilate import nearest_covered
 from vegtool.baking.pack import pack
+
+
+def owners(shape, rect, gutter):
+    """The picture to which each texel belongs, gutter included, or -1."""
+    label = np.full(shape, -1)
+    for i, (x, y, w, h) in enumerate(rect.tolist()):
+        label[max(y - gutter, 0) : y + h + gutter, max(x - gutter, 0) : x + w + gutter] = i
+    return label
 
 
 def plainly(covered, rect, gutter):

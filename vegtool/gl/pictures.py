@@ -21,7 +21,7 @@ from vegtool.gl.upload import PlantBuffers
 RGB10_A2 = 0x8059
 CLIP_PLANES = (0x3000, 0x3001, 0x3002, 0x3003)
 PICTURES_PER_ROW = 1024
-SAMPLE_LIMIT = 12_000_000
+SAMPLE_LIMIT = 4_000_000
 """Samples drawn at a time, 12 bytes each; larger atlases are drawn band by band."""
 LEAST_HALF_SIZE = 1e-7
 """Of the plant's radius: keeps the scale of a picture without width finite; it stays empty."""
