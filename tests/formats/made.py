@@ -58,9 +58,7 @@ class Gltf:
 
     def image(self, data: bytes, mime: str = "image/png") -> int:
         """A texture whose image lies in the buffer."""
-        self.json.setdefault("images", []).append(
-            {"bufferView": self.view(data), "mimeType": mime}
-        )
+        self.json.setdefault("images", []).append({"bufferView": self.view(data), "mimeType": mime})
         self.json.setdefault("textures", []).append({"source": len(self.json["images"]) - 1})
         return len(self.json["textures"]) - 1
 

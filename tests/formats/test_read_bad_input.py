@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import struct
 from pathlib import Path
 from typing import Any
@@ -197,9 +196,7 @@ def test_draco_without_its_decoder_names_the_extra(
     def compress(tree: dict[str, Any]) -> None:
         tree["extensionsRequired"] = ["KHR_draco_mesh_compression"]
         extension = {"bufferView": 0, "attributes": {"POSITION": 0}}
-        tree["meshes"][0]["primitives"][0]["extensions"] = {
-            "KHR_draco_mesh_compression": extension
-        }
+        tree["meshes"][0]["primitives"][0]["extensions"] = {"KHR_draco_mesh_compression": extension}
 
     path = changed(tmp_path, compress)
     with monkeypatch.context() as patch:
@@ -264,7 +261,7 @@ def test_gltf_paths_that_leave_the_folder(tmp_path: Path, reference: str) -> Non
     inside = tmp_path / "inside"
     inside.mkdir()
     (tmp_path / "secret.png").write_bytes(png(leaf_pixels()))
-    os.symlink(tmp_path / "secret.png", inside / "link.png")
+    (inside / "link.png").symlink_to(tmp_path / "secret.png")
     refused(textured(inside, uri=reference), repr(reference), "copy that file")
     tree = {"asset": {"version": "2.0"}, "buffers": [{"uri": reference, "byteLength": 12}]}
     tree["bufferViews"] = [{"buffer": 0, "byteLength": 12}]  # type: ignore[list-item]
@@ -282,7 +279,7 @@ def test_obj_paths_that_leave_the_folder(tmp_path: Path, reference: str) -> None
     inside = tmp_path / "inside"
     inside.mkdir()
     (tmp_path / "secret.png").write_bytes(png(leaf_pixels()))
-    os.symlink(tmp_path / "secret.png", inside / "link.png")
+    (inside / "link.png").symlink_to(tmp_path / "secret.png")
     (inside / "m.mtl").write_text(f"newmtl leaf\nmap_Kd {reference}\n")
     (inside / "tree.obj").write_text(OBJ)
     refused(inside / "tree.obj", repr(reference))
@@ -349,4 +346,4 @@ def test_input_is_not_changed(tmp_path: Path) -> None:
     path = quad_file(tmp_path / "quad.glb", indices=QUAD_FACES)
     before = path.read_bytes()
     read_plant(path)
-    assert path.read_bytes() == before and os.listdir(tmp_path) == ["quad.glb"]
+    assert path.read_bytes() == before and list(tmp_path.iterdir()) == [path]

@@ -156,8 +156,10 @@ def test_a_mirror_turns_faces_and_normals_stay_outside(tmp_path: Path) -> None:
 def test_normals_under_uneven_scale_stay_perpendicular(tmp_path: Path) -> None:
     made = Gltf()
     slope = np.array([[0, 0, 0], [1, 0, 1], [0, 1, 0]], np.float32)
-    normals = np.tile(np.array([-1, 0, 1], np.float32) / np.sqrt(2), (3, 1))
-    made.node(mesh=made.mesh(slope, np.array([0, 1, 2], np.uint16), NORMAL=normals), scale=[3, 1, 1])
+    normals = np.tile(np.array([-np.sqrt(0.5), 0, np.sqrt(0.5)], np.float32), (3, 1))
+    made.node(
+        mesh=made.mesh(slope, np.array([0, 1, 2], np.uint16), NORMAL=normals), scale=[3, 1, 1]
+    )
     plant = read_plant(made.write(tmp_path / "slope.glb"))
     expected = np.array([-1, 0, 3]) / np.sqrt(10)
     assert np.allclose(plant.normals, expected, atol=1e-7)
@@ -487,7 +489,9 @@ def test_skin_is_drawn_in_the_pose_of_its_joints(tmp_path: Path) -> None:
     made.json["skins"] = [{"joints": [root, tip], "inverseBindMatrices": made.array(bind)}]
     made.node(mesh=mesh, skin=0, translation=[100, 0, 0])
     plant = read_plant(made.write(tmp_path / "skin.glb"))
-    assert np.allclose(plant.positions, QUAD + [[0, 0, 0], [0, 0, 0], [0, 2, 0], [0, 2, 0]])
+    assert np.allclose(
+        plant.positions, QUAD + np.array([[0, 0, 0], [0, 0, 0], [0, 2, 0], [0, 2, 0]])
+    )
 
 
 def test_draco(tmp_path: Path) -> None:
