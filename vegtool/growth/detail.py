@@ -44,7 +44,7 @@ def wood_detail(
         total = sum(len(stems) for stems in skeleton)
         return [
             WoodDetail(
-                (rank < total * scale**0.6) | (stems.parent < 0) if level.sides else rank < 0,
+                rank < (max(1, total * scale**0.6) if level.sides else 0),
                 _steps(level.sides * scale**0.2 + spread[0], FEWEST_SIDES),
                 _steps(
                     level.segments

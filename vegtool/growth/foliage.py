@@ -72,6 +72,7 @@ def foliage(
     normals = np.cross(across_row, tangent)
     edge = half[..., None] * across_row
     positions = np.stack([center - edge, center + edge], axis=2)
+    positions[..., 1] -= np.minimum(positions[..., 1].min(axis=(1, 2), keepdims=True), 0)
     faces = grid_faces(segments, 1, kind.pointed)
     return Piece(
         positions.reshape(-1, 3),
@@ -96,7 +97,7 @@ def _bend(
         share = droop[:, None] / segments * (0.5 if step == 0 else 1.0)
         tangents[:, step] = tangent
         tangent = np.cos(share) * tangent + np.sin(share) * down
-        tangent = above_ground(tangent, points[:, step])
+        tangent = above_ground(tangent, points[:, step], length / segments)
         points[:, step + 1] = points[:, step] + tangent * (length / segments)[:, None]
     tangents[:, segments] = tangent
     return points, tangents

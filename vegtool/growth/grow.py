@@ -57,7 +57,7 @@ def grow_species(name: str, species: Species, triangles: int | None, seed: int) 
             species.flare if depth == 0 else 0.0,
         )
     left = triangles - sum(len(piece.faces) for piece in pieces)
-    materials = [_bark(species)]
+    materials = [_bark(species)] if any(level.sides for level in species.stems) else []
     for index, kind in enumerate(species.foliage):
         count, segments = leaf_detail(species, kind, triangles, left)
         bearing = kind.levels or (len(skeleton) - 1,)

@@ -113,10 +113,13 @@ def aim(
     return unit(np.cos(down) * direction + np.sin(down) * outward)
 
 
-def above_ground(direction: FloatArray, point: FloatArray) -> FloatArray:
-    """The directions (n, 3), level where they would lead on below the ground from points (n, 3)."""
-    low = (point[:, 1] <= 0) & (direction[:, 1] < 0)
-    return unit(np.where(low[:, None], direction * np.array([1.0, 0.0, 1.0]), direction))
+def above_ground(direction: FloatArray, point: FloatArray, step: FloatArray) -> FloatArray:
+    """The directions (n, 3), less steep where a step (n,) from the points (n, 3) ends below it."""
+    least = -np.clip(point[:, 1] / step, 0.0, 1.0)
+    low = direction[:, 1] < least
+    level = direction * np.array([1.0, 0.0, 1.0])
+    shallow = unit(level) * np.sqrt(1 - least**2)[:, None] + least[:, None] * UP
+    return unit(np.where(low[:, None], shallow, direction))
 
 
 def envelope_at(envelope: tuple[float, ...], share: FloatArray) -> FloatArray:
@@ -194,7 +197,7 @@ def _grow(
         direction = unit(
             direction + (curve + bend[0]) * upward + bend[1] * side + (level.tropism / STEPS) * UP
         )
-        direction = above_ground(direction, points[:, step])
+        direction = above_ground(direction, points[:, step], length / STEPS)
         side = across(side, direction)
         points[:, step + 1] = points[:, step] + direction * (length / STEPS)[:, None]
         sides[:, step + 1] = side

@@ -7,6 +7,7 @@ alpha 0, so that no dark rim shows where a client filters.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -21,6 +22,7 @@ CELLS = 2  # drawings per row and column of a leaf texture
 CELL_MARGIN = 0.015  # of a cell, kept clear of the next drawing
 
 
+@lru_cache(maxsize=16)
 def bark_textures(bark: Bark) -> tuple[Texture, Texture]:
     """Colour and tangent-space normals, (SIZE, SIZE) pixels, tileable both ways."""
     rng = generator(0, "bark", *bark.colors)
@@ -54,6 +56,7 @@ def tileable_noise(size: int, across: float, along: float, rng: np.random.Genera
     return np.asarray(noise / noise.std())
 
 
+@lru_cache(maxsize=16)
 def leaf_texture(species: str, index: int, kind: Foliage) -> Texture:
     """The drawings of one kind of foliage, CELLS x CELLS of them, roots at the bottom."""
     cell = SIZE // CELLS
