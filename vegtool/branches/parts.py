@@ -16,7 +16,7 @@ from vegtool.arrays import FloatArray
 Labels = np.ndarray
 """int64 labels, dense from 0."""
 
-WELD = 2.0**-19  # grid step, as a fraction of the plant's radius (its half diagonal)
+WELD = 2.0**-19  # grid step, as a fraction of the plant's radius about its mean corner
 SOUP_FACES_PER_PART = 2.5  # index-connected parts smaller than this on average are no tubes
 RUNS_PER_PART = 1.5  # at most so many stretches of the file per part: the order means something
 

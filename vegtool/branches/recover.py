@@ -56,12 +56,14 @@ def recover_branches(plant: Plant, progress: Progress = silent) -> Branches:
 
 
 def _unit_positions(plant: Plant) -> FloatArray:
-    """Positions about the middle of the bounds, scaled so that the bounds' half diagonal is 1."""
+    """Positions about the mean corner, the farthest at distance 1, however the plant is turned."""
     low, high = plant.bounds
-    half = (high - low) / 2
-    size = np.linalg.norm(half / max(half.max(), np.finfo(float).tiny)) * half.max()
-    centred = plant.positions - (low + half)
-    return np.asarray(np.clip(centred / max(size, np.finfo(float).tiny), -1, 1))
+    extent = float((high - low).max()) or 1.0  # small numbers first, before any squares
+    local = (np.clip(plant.positions, low, high) - (low + high) / 2) / extent
+    used = local[plant.faces].reshape(-1, 3)
+    center = used.mean(axis=0)
+    radius = float(np.sqrt(((used - center) ** 2).sum(axis=1).max())) or 1.0
+    return np.asarray(np.clip((local - center) / radius, -1, 1))
 
 
 def _branches(face_tube: np.ndarray, parent: np.ndarray) -> Branches:
