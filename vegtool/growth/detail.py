@@ -44,11 +44,11 @@ def wood_detail(
         total = sum(len(stems) for stems in skeleton)
         return [
             WoodDetail(
-                rank < (max(1, total * scale**0.6) if level.sides else 0),
+                rank < (max(1, total * scale**0.75) if level.sides else 0),
                 _steps(level.sides * scale**0.2 + spread[0], FEWEST_SIDES),
                 _steps(
                     level.segments
-                    * scale**0.3
+                    * scale**0.2
                     * np.sqrt(stems.length / max(stems.length.mean(), 1e-9))
                     + spread[1],
                     FEWEST_SEGMENTS,
