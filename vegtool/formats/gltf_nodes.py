@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from vegtool.arrays import FloatArray
+from vegtool.arrays import FloatArray, unit
+from vegtool.formats.clean import LARGEST
 from vegtool.formats.gltf_data import GltfFile
 
 MAX_PLACEMENTS = 1_000_000
@@ -127,9 +128,9 @@ def _instances(file: GltfFile, entry: dict[str, Any]) -> FloatArray | None:
 def rotations(quaternions: FloatArray) -> FloatArray:
     """(n, 3, 3) rotation matrices of (n, 4) quaternions x, y, z, w of any length; zero turns
     nothing."""
-    length = np.linalg.norm(quaternions, axis=1, keepdims=True)
-    identity = np.array([0.0, 0, 0, 1])
-    q = np.where(length > 0, quaternions / np.where(length > 0, length, 1.0), identity)
+    finite = np.nan_to_num(quaternions, posinf=0.0, neginf=0.0)
+    turning = finite.any(axis=1, keepdims=True)
+    q = unit(np.where(turning, finite, np.array([0.0, 0, 0, 1])))
     x, y, z, w = q.T
     return np.asarray(
         np.stack(
@@ -145,6 +146,6 @@ def rotations(quaternions: FloatArray) -> FloatArray:
 
 def _numbers(file: GltfFile, values: Any, count: int) -> FloatArray:
     array = np.array(values, dtype=np.float64)
-    if array.shape != (count,) or not np.isfinite(array).all():
+    if array.shape != (count,) or not (np.abs(np.nan_to_num(array, nan=np.inf)) < LARGEST).all():
         raise file.broken(f"{count} finite numbers in a node's transform", f"{values!r}"[:60])
     return array

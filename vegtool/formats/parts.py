@@ -37,6 +37,20 @@ class Part:
     point: IndexArray | None = None
     branch: IndexArray | int = -1
 
+    def __post_init__(self) -> None:
+        count = len(self.positions)
+        shapes = {
+            "positions": (self.positions, (count, 3)),
+            "faces": (self.faces, (len(self.faces), 3)),
+            "normals": (self.normals, (count, 3)),
+            "uvs": (self.uvs, (count, 2)),
+            "colors": (self.colors, (count, 4)),
+            "point": (self.point, (count,)),
+        }
+        for name, (array, shape) in shapes.items():
+            if array is not None and array.shape != shape:
+                raise ValueError(f"{name} of shape {array.shape} where {shape} is expected")
+
 
 @dataclass(frozen=True, eq=False)
 class Declared:

@@ -19,7 +19,8 @@ def triangulate(corners: IndexArray, points: FloatArray) -> IndexArray:
     fan = np.stack([np.zeros_like(steps), steps, steps + 1], axis=1)
     places = np.broadcast_to(fan, (count, size - 2, 3)).copy()
     if size > 3:
-        rings = points[corners] - points[corners].mean(axis=1, keepdims=True)
+        with np.errstate(invalid="ignore", over="ignore"):  # broken points, dropped later
+            rings = points[corners] - points[corners].mean(axis=1, keepdims=True)
         for row in np.flatnonzero(~_convex(rings)):
             places[row] = _ears(rings[row])
     return places.reshape(-1, 3)

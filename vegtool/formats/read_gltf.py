@@ -195,7 +195,7 @@ def _read_primitive(
         _joined(attributes, "JOINTS"),
         _joined(attributes, "WEIGHTS"),
         {
-            key.upper(): np.round(np.nan_to_num(_floats(values)[:, 0], nan=-1)).astype(np.int64)
+            key.upper(): _identities(values)
             for key, values in attributes.items()
             if key.upper().startswith("_BRANCH") and values.shape[1] == 1
         },
@@ -270,6 +270,12 @@ def _triangles(indices: IndexArray, mode: int) -> IndexArray:
 def _floats(values: np.ndarray) -> FloatArray:
     with np.errstate(invalid="ignore"):  # signalling NaN
         return np.asarray(values, dtype=np.float64)
+
+
+def _identities(values: np.ndarray) -> IndexArray:
+    """(v,) whole numbers of a scalar attribute, -1 where it holds none."""
+    numbers = np.nan_to_num(_floats(values)[:, 0], nan=-1, posinf=-1, neginf=-1)
+    return np.round(numbers.clip(-1, 2**31)).astype(np.int64)
 
 
 def _uvs(values: np.ndarray | None, source: UvSource) -> FloatArray | None:

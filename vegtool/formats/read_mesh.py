@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import logging
 import re
 import struct
 import warnings
@@ -32,27 +33,31 @@ def parse(path: Path) -> Parsed:
     from trimesh.exchange.ply import load_ply
     from trimesh.exchange.stl import load_stl
 
+    if not logging.getLogger("trimesh").handlers:  # else it would write to stderr
+        logging.getLogger("trimesh").addHandler(logging.NullHandler())
     kind = path.suffix.lower()[1:].upper()
     data = path.read_bytes()
     _check_counts(path, kind, data)
+    notes: list[str] = []
     try:
         with np.errstate(all="ignore"), warnings.catch_warnings():
             warnings.simplefilter("ignore")
             warnings.simplefilter("error", DeprecationWarning)  # numpy's word for "not a number"
             stream = io.BytesIO(data)
             loaded = load_ply(stream, skip_materials=True) if kind == "PLY" else load_stl(stream)
+            solids = loaded.get("geometry", {"": loaded})
+            parts = [
+                _part(path, name, solid, notes)
+                for name, solid in solids.items()
+                if solid.get("faces") is not None
+            ]
+    except InputError:
+        raise
     except Exception as error:  # trimesh raises whatever the broken file made it stumble over
         raise InputError(
             f"{path}: expected {kind} data, found something that is not "
             f"({type(error).__name__}: {error}); check the file's type or export it again"
         ) from error
-    notes: list[str] = []
-    solids = loaded.get("geometry", {"": loaded})
-    parts = [
-        _part(path, name, solid, notes)
-        for name, solid in solids.items()
-        if solid.get("faces") is not None
-    ]
     material = replace(PLAIN, color_texture=_texture(path, data, notes)) if kind == "PLY" else PLAIN
     return Parsed(
         name=path.stem, parts=parts, materials=[_with_alpha(material, notes)], notes=notes

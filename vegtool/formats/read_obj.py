@@ -185,7 +185,7 @@ def _read_faces(
         texts = [lines.faces[k] for k in members]
         try:
             polygons = _corner_indices(texts, size, slashes, skips)
-        except ValueError:
+        except (ValueError, OverflowError):
             raise InputError(
                 f"{path}: expected faces like 'f 1/1/1 2/2/2 3/3/3', found 'f {texts[0]}' or one "
                 "like it; export it again"
@@ -300,7 +300,10 @@ def _part(
     def taken(table: FloatArray, at: IndexArray) -> FloatArray:
         return np.where((at >= 0)[:, None], table[np.maximum(at, 0)], 0.0)
 
-    laid = taken(uvs, uv)[:, :2] * material.uv_scale + material.uv_offset if len(uvs) else None
+    laid = None
+    if len(uvs):
+        with np.errstate(invalid="ignore", over="ignore"):  # infinite ones are set to 0 later
+            laid = taken(uvs, uv)[:, :2] * material.uv_scale + material.uv_offset
     tint = None
     if colors is not None:
         textured = material.material.color_texture is not None
