@@ -57,7 +57,7 @@ def statue(triangles: int | None, seed: int) -> Plant:
     positions = np.stack([r * np.sin(theta) * 1.0, y, r * np.cos(theta) * 0.88], axis=-1)
     sway = 0.035 * np.sin(np.pi * np.clip((y - 0.16) / 1.8, 0, 1) * 1.5)
     positions[..., 0] += sway
-    grain = 0.003 * octaves(positions.reshape(-1, 3) * 30, 3, 0.6, rng).reshape(theta.shape)
+    grain = 0.004 * octaves(positions.reshape(-1, 3) * 16, 3, 0.6, rng).reshape(theta.shape)
     outward = unit(np.stack([np.sin(theta), np.zeros_like(theta), np.cos(theta)], axis=-1))
     positions += (grain * np.clip(r / 0.05, 0, 1))[..., None] * outward
     bottom, top = positions[0, 0], positions[-1, 0]
@@ -105,9 +105,9 @@ def _relief(
         phase, slant = rng.uniform(0, 2 * np.pi), rng.uniform(-1.6, 1.6)
         folds += strength * np.cos(number * theta + phase + slant * 2 * y + 0.6 * np.sin(4 * y))
     relief = 0.020 * robe * (0.35 + hem) * folds
-    flutes = np.exp(-np.minimum(((y - 0.08) / 0.03) ** 2, 60.0)) * np.abs(np.cos(14 * theta))
+    flutes = np.exp(-np.minimum(((y - 0.08) / 0.03) ** 2, 60.0)) * np.abs(np.cos(10 * theta))
     border = np.exp(-np.minimum(((y - 0.27) / 0.035) ** 2, 60.0))
-    relief += 0.012 * flutes + 0.004 * border * np.cos(36 * theta) * np.cos(y * 170)
+    relief += 0.012 * flutes + 0.007 * border * np.cos(20 * theta) * np.cos(y * 90)
     for angle, height, wide, tall, out in FEATURES:
         turn = np.angle(np.exp(1j * (theta - np.radians(angle))))
         # On the axis a turn means nothing, so features fade out towards it.
