@@ -1,0 +1,85 @@
+"""Pictures by the camera, on shapes whose picture is known."""
+
+from __future__ import annotations
+
+from io import BytesIO
+
+import numpy as np
+import pytest
+from golden_pictures import assert_golden
+from PIL import Image
+
+from vegtool.convert import ConvertOptions, convert
+from vegtool.gl.draw import Light
+from vegtool.gl.upload import PlantBuffers
+from vegtool.growth import sample
+from vegtool.measure.contact_sheet import contact_sheet
+from vegtool.measure.pictures import live, over, srgb, truth
+from vegtool.measure.views import Camera, direction
+from vegtool.plant import Material, Plant, Texture
+
+pytestmark = pytest.mark.gl
+AMBIENT = Light(sun=0.0, sky_above=1.0, sky_below=1.0)
+
+
+def square(material: Material, offset: float = 0.0) -> Plant:
+    """A unit square in the plane z = 0, facing +z."""
+    corners = np.array([[-0.5, -0.5, 0], [0.5, -0.5, 0], [0.5, 0.5, 0], [-0.5, 0.5, 0]])
+    uvs = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], float)
+    faces = [[0, 1, 2], [0, 2, 3]]
+    normals = np.tile([0.0, 0, 1], (4, 1))
+    return Plant("square", corners + offset, normals, uvs, faces, [0, 0], (material,))
+
+
+def front(offset: float = 0.0, back: bool = False) -> Camera:
+    """Sees two metres of height in 64 pixels."""
+    fov = 2 * np.degrees(np.arctan(1 / 10))
+    return Camera(np.full(3, offset), direction(180.0 * back, 0), 10.0, fov, 64, 64, 2.0)
+
+
+def test_a_square_covers_a_quarter_of_the_frame_in_its_own_colour() -> None:
+    red = Material("red", base_color=[0.5, 0.1, 0.0, 1.0])
+    with PlantBuffers(square(red)) as buffers:
+        picture = truth(buffers, front(), AMBIENT)
+    assert picture[..., 3].mean() == pytest.approx(0.25, abs=0.002)
+    np.testing.assert_allclose(picture[32, 32], [0.5, 0.1, 0, 1], atol=1e-3)
+    assert not picture[:15].any()
+
+
+def test_single_sided_is_not_seen_from_behind_and_double_sided_is() -> None:
+    for double_sided in (False, True):
+        with PlantBuffers(square(Material("m", double_sided=double_sided))) as buffers:
+            assert truth(buffers, front(back=True), AMBIENT).any() == double_sided
+
+
+def test_the_truth_keeps_the_coverage_that_alpha_tested_mips_lose() -> None:
+    """One texel in four is leaf: supersampled, a quarter of the square is covered; through mips,
+    alpha averages to a quarter, below the cutoff, and nothing is left."""
+    pixels = np.zeros((256, 256, 4), np.uint8)
+    pixels[::2, ::2] = 255
+    leaf = Material("leaf", color_texture=Texture("t", pixels), alpha_mode="mask")
+    with PlantBuffers(square(leaf)) as buffers:
+        nearest = truth(buffers, front(), AMBIENT, supersample=8)
+    with PlantBuffers(square(leaf), mipmaps=True) as buffers:
+        assert live(buffers, front(), AMBIENT)[..., 3].sum() == 0
+    assert nearest[16:48, 16:48, 3].mean() > 0.2
+
+
+def test_far_from_the_origin_the_picture_is_the_same() -> None:
+    """5e6 metres: float32 alone would put vertices half a metre apart."""
+    material = Material("m", base_color=[0.2, 0.4, 0.6, 1])
+    with PlantBuffers(square(material)) as near, PlantBuffers(square(material, 5e6)) as far:
+        np.testing.assert_array_equal(truth(near, front()), truth(far, front(5e6)))
+
+
+def test_srgb_of_known_values() -> None:
+    values = srgb(np.array([0.0, 0.0031308, 0.2140411, 1.0], np.float32))
+    np.testing.assert_allclose(values, [0, 0.04045, 0.5, 1], atol=1e-4)
+    half = np.array([[[0.0, 0, 0, 0.5]]], np.float32)
+    assert over(half, (1, 1, 1))[0, 0, 0] == 188, "linear 0.5 is sRGB 188"
+
+
+def test_contact_sheet_is_the_one_that_was_looked_at() -> None:
+    chain = convert(sample("broadleaf", 4000), ConvertOptions(billboards=64, levels=2))
+    sheet = np.asarray(Image.open(BytesIO(contact_sheet(chain))).convert("RGB"))
+    assert_golden("contact_sheet_broadleaf", sheet)

@@ -1,0 +1,108 @@
+"""The pipeline: what a chain of levels promises, on small made plants."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vegtool.convert import NEAR_PIXELS, ConvertOptions, billboard_counts, convert
+from vegtool.errors import UsageError
+from vegtool.growth import sample
+from vegtool.lod import LodChain
+from vegtool.plant import Plant
+
+pytestmark = pytest.mark.gl
+OPTIONS = ConvertOptions(billboards=30, levels=3)
+
+
+@pytest.fixture(scope="module")
+def bush() -> Plant:
+    return sample("bush", 800)
+
+
+@pytest.fixture(scope="module")
+def chain(bush: Plant) -> LodChain:
+    return convert(bush, OPTIONS)
+
+
+def test_a_third_of_the_billboards_at_twice_the_distance(chain: LodChain) -> None:
+    levels = chain.levels[1:]
+    for level, most in zip(levels, (30, 10, 3), strict=True):
+        assert level.billboards is not None
+        assert 0 < len(level.billboards) <= most
+    near = [level.near_distance_m for level in levels]
+    assert near[1] == 2 * near[0]
+    assert near[2] == 4 * near[0]
+
+
+def test_one_texel_per_pixel_at_the_near_end(chain: LodChain, bush: Plant) -> None:
+    level = chain.levels[1]
+    size = np.ptp(bush.bounds, axis=0).max()
+    assert size * chain.display.pixels_per_metre(level.near_distance_m) == pytest.approx(
+        NEAR_PIXELS
+    )
+    assert level.texels_per_metre == pytest.approx(NEAR_PIXELS / size)
+
+
+def test_the_original_comes_first_and_every_option_is_written_down(
+    chain: LodChain, bush: Plant
+) -> None:
+    assert chain.levels[0].mesh is bush
+    assert chain.options["billboards"] == 30
+    assert ConvertOptions(**chain.options) == OPTIONS
+
+
+def test_no_level_costs_more_than_half_of_the_original() -> None:
+    herb = sample("herb", 400)
+    counts = billboard_counts(herb, ConvertOptions(billboards=1000, levels=3))
+    assert counts[0] * 2 <= len(herb.faces) / 2
+    assert counts == sorted(counts, reverse=True)
+    assert counts[-1] >= 1
+
+
+@pytest.mark.parametrize("method", ["kmeans", "isodata", "branches"])
+@pytest.mark.parametrize("shape", ["auto", "single", "crossed"])
+def test_every_method_and_shape_shows_every_face(bush: Plant, method: str, shape: str) -> None:
+    made = convert(bush, replace(OPTIONS, method=method, shape=shape, levels=1))
+    level = made.levels[1]
+    assert level.billboards is not None
+    assert level.atlas is not None
+    assert len(level.billboards) <= OPTIONS.billboards
+    assert level.geometric_error_m is not None
+    assert level.geometric_error_m[0] < 2 * bush.radius
+    covered = level.atlas.color[..., 3].mean() / 255
+    assert 0.02 < covered < 1
+
+
+def test_same_seed_same_bytes(bush: Plant, chain: LodChain) -> None:
+    again = convert(bush, OPTIONS)
+    for one, two in zip(chain.levels[1:], again.levels[1:], strict=True):
+        assert one.atlas is not None
+        assert two.atlas is not None
+        np.testing.assert_array_equal(one.atlas.color, two.atlas.color)
+        np.testing.assert_array_equal(one.atlas.normal, two.atlas.normal)
+
+
+def test_a_plant_elsewhere_gives_the_same_levels_elsewhere(bush: Plant, chain: LodChain) -> None:
+    """Georeferenced, 5e6 metres away: positions there are exact to 1e-9 m, so labels may differ
+    on ties only; what is compared is the count and the covered area."""
+    move = np.array([5e6, 0.0, -5e6])
+    moved = convert(replace(bush, positions=bush.positions + move), OPTIONS)
+    for one, two in zip(chain.levels[1:], moved.levels[1:], strict=True):
+        assert one.billboards is not None
+        assert two.billboards is not None
+        assert len(one.billboards) == pytest.approx(len(two.billboards), rel=0.1)
+        areas = [np.prod(b.half_size, axis=1).sum() for b in (one.billboards, two.billboards)]
+        assert areas[0] == pytest.approx(areas[1], rel=0.05)
+        assert np.abs(two.billboards.center - move).max() < 2 * bush.radius
+
+
+def test_a_plant_without_extent_is_refused() -> None:
+    point = Plant(
+        "point", np.zeros((3, 3)), np.tile([0.0, 1, 0], (3, 1)), np.zeros((3, 2)),
+        [[0, 1, 2]], [0], sample("bush", 800).materials[:1],
+    )  # fmt: skip
+    with pytest.raises(UsageError, match="extent"):
+        convert(point)
