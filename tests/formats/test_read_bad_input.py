@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from made import QUAD, QUAD_FACES, QUAD_UV, Gltf, glb, leaf_pixels, png, png_header, quad_file
 
-from vegtool.errors import CapabilityError, InputError, UsageError
+from vegtool.errors import CapabilityError, InputError, UsageError, VegtoolError
 from vegtool.formats import ReadOptions, read_plant
 
 OBJ = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl leaf\nf 1 2 3\n"
@@ -329,6 +329,29 @@ def test_ply_index_out_of_range(tmp_path: Path) -> None:
         "0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n"
     )
     refused(path)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_random_damage_is_read_or_refused(tmp_path: Path, seed: int) -> None:
+    """Bytes of a small tree's JSON or buffer are overwritten at random: whatever it becomes, it is
+    read or refused with a message, nothing else is raised."""
+    rng = np.random.default_rng(seed)
+    made = Gltf()
+    leaf = made.material(name="leaf", alphaMode="MASK")
+    top = made.node(name="bark", scale=[1, -1, 2], mesh=made.mesh(material=leaf))
+    made.node(top, mesh=made.mesh(TEXCOORD_0=QUAD_UV, _BRANCH=np.zeros(4, np.float32)))
+    whole = made.bytes()
+    readable = 0
+    for _ in range(60):
+        data = bytearray(whole)
+        for at in rng.integers(12, len(data), 3):
+            data[at] = rng.integers(32, 127) if rng.random() < 0.8 else rng.integers(0, 256)
+        (tmp_path / "damaged.glb").write_bytes(data)
+        try:
+            readable += len(read_plant(tmp_path / "damaged.glb").faces) > 0
+        except VegtoolError as error:
+            assert "damaged.glb" in str(error)
+    assert readable < 60
 
 
 def test_options_that_make_no_sense(tmp_path: Path) -> None:
