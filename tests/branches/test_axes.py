@@ -6,7 +6,6 @@ import numpy as np
 from branch_cases import tube
 
 from vegtool.branches.axes import Axes, axes_of
-from vegtool.branches.leaves import nearest_tubes
 from vegtool.branches.parts import connected_parts
 from vegtool.branches.skeleton import skeleton
 from vegtool.branches.tubes import cut_tubes
@@ -68,5 +67,7 @@ def test_the_nearest_tube_is_that_of_a_plain_search():
     axes = Axes(a, b, radius, radius, np.arange(60), np.zeros(60))
     points = rng.uniform(-1, 1, (500, 3))
     distance = axes.measure(points, np.tile(np.arange(60), (500, 1)))[0]
-    tube_of, _ = nearest_tubes(points, axes)
+    tube_of, cost = axes.nearest_tubes(points)
     assert (tube_of == distance.argmin(axis=1)).mean() > 0.99
+    again = axes.cost_to_tube(points, tube_of)
+    assert np.allclose(again, cost)

@@ -212,18 +212,18 @@ def test_progress_runs_from_nought_to_one():
 
 
 @pytest.mark.parametrize("variant", list(bench.VARIANTS))
-@pytest.mark.parametrize(
-    ("name", "wood", "leaf"),
-    [("broadleaf", 98, 80), ("conifer", 99, 85), ("bush", 95, 60), ("palm", 99, 97),
-     ("dead-tree", 99, 0), ("herb", 99, 85)],
-)  # fmt: skip
-def test_samples(name, wood, leaf, variant):
-    """Floors below what benchmarks/branches.py measures, so that it does not get worse unseen."""
+@pytest.mark.parametrize("name", ["broadleaf", "conifer", "bush", "palm", "dead-tree", "herb"])
+def test_samples(name, variant):
+    """Floors well below what benchmarks/branches.py measures: it may not get worse unseen.
+
+    Their tubes are coarser than the curves on which their leaves stand, so that many leaves touch
+    no wood; in random order nothing else tells where these belong.
+    """
     case = bench.VARIANTS[variant](bench.sample_case(name))
     right = bench.right_faces(recover_branches(case.plant), case.truth)
-    is_leaf = case.plant.face_is_leaf
-    assert 100 * right[~is_leaf].mean() >= wood
-    assert not is_leaf.any() or 100 * right[is_leaf].mean() >= leaf
+    leaf = case.plant.face_is_leaf
+    assert right[~leaf].mean() >= 0.97
+    assert not leaf.any() or right[leaf].mean() >= (0.5 if "shuffled" in variant else 0.85)
 
 
 def real(*values):

@@ -12,6 +12,8 @@ from vegtool.arrays import FloatArray
 from vegtool.branches.skeleton import Skeleton
 from vegtool.branches.tubes import Tubes
 
+NEIGHBOURS = 3  # samples looked at for each leaf
+DEPTH = 0.1  # inside wood, a tenth of the distance to the axis counts
 MOST_SAMPLES = 12  # per segment; one per diameter, so that the nearest lies on a near segment
 
 
@@ -58,6 +60,35 @@ class Axes:
         distance = np.linalg.norm(points[:, None] - a - t[..., None] * line, axis=-1)
         radius = self.radius_a[segment] * (1 - t) + self.radius_b[segment] * t
         return distance, radius, self.along[segment] + t * np.sqrt(square)
+
+    def cost(self, points: FloatArray, segment: np.ndarray) -> FloatArray:
+        """(n, k) what it costs to hang a leaf with its anchor at the point on the segment: the gap
+        to the wood's surface; inside the wood, how deep."""
+        distance, radius, _ = self.measure(points, segment)
+        return np.maximum(distance - radius, 0) + DEPTH * distance
+
+    def nearest_tubes(self, points: FloatArray) -> tuple[np.ndarray, FloatArray]:
+        """(n,) the tube on which it costs least to hang a leaf anchored at each point, and the
+        cost, (n,)."""
+        segment_of = self.samples[1]
+        k = min(NEIGHBOURS, len(segment_of))
+        near = self.tree.query(points, k=k)[1].reshape(len(points), k)
+        segment = segment_of[near]
+        cost = self.cost(points, segment)
+        best = cost.argmin(axis=1)
+        row = np.arange(len(points))
+        return self.tube[segment[row, best]], cost[row, best]
+
+    def cost_to_tube(self, points: FloatArray, tube: np.ndarray) -> FloatArray:
+        """(n,) what it costs to hang a leaf anchored at each point on that tube."""
+        size = np.bincount(self.tube)
+        first, count = (np.cumsum(size) - size)[tube], size[tube]
+        row = np.repeat(np.arange(len(points)), count)
+        nth = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
+        segment = np.argsort(self.tube, kind="stable")[first[row] + nth]
+        least = np.full(len(points), np.inf)
+        np.minimum.at(least, row, self.cost(points[row], segment[:, None])[:, 0])
+        return least
 
 
 def axes_of(rings: Skeleton, tubes: Tubes) -> Axes:

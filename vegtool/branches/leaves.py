@@ -13,11 +13,10 @@ import numpy as np
 
 from vegtool.arrays import FloatArray
 from vegtool.branches.axes import Axes
+from vegtool.branches.order import follow_order
 from vegtool.branches.parts import Parts
 
-NEIGHBOURS = 3  # axis samples looked at for each anchor
 BLOB = 0.3  # of the plant's radius: a leaf part whose radius is larger goes face by face
-DEPTH = 0.1  # inside wood, a tenth of the distance to the axis counts
 OFTEN = 0.5  # of the most frequent one: edges nearest to wood so often may be the attached one
 ASKED = 1000  # leaves of each number of faces that are asked which edge that is
 MOST_FACES = 24  # of a leaf whose edges are compared with those of others
@@ -30,23 +29,10 @@ def hang_leaves(parts: Parts, axes: Axes) -> np.ndarray:
     anchors = ((corners + np.roll(corners, -1, axis=1)) / 2).reshape(-1, 3)
     leaf = np.repeat(owner, 3)
     rows = np.flatnonzero(_attached(owner, anchors, axes))
-    tube, cost = nearest_tubes(anchors[rows], axes)
+    tube, cost = axes.nearest_tubes(anchors[rows])
     order = np.lexsort((cost, leaf[rows]))
-    first = np.searchsorted(leaf[rows][order], np.arange(int(owner.max()) + 1))
-    return np.asarray(tube[order[first]][owner])
-
-
-def nearest_tubes(points: FloatArray, axes: Axes) -> tuple[np.ndarray, FloatArray]:
-    """(n,) the tube nearest to each point, and the cost of it: the gap to the surface."""
-    segment_of = axes.samples[1]
-    k = min(NEIGHBOURS, len(segment_of))
-    near = axes.tree.query(points, k=k)[1].reshape(len(points), k)
-    segment = segment_of[near]
-    distance, radius, _ = axes.measure(points, segment)
-    cost = np.maximum(distance - radius, 0) + DEPTH * distance
-    best = cost.argmin(axis=1)
-    row = np.arange(len(points))
-    return axes.tube[segment[row, best]], cost[row, best]
+    best = order[np.searchsorted(leaf[rows][order], np.arange(int(owner.max()) + 1))]
+    return np.asarray(follow_order(anchors[rows[best]], tube[best], cost[best], axes)[owner])
 
 
 def _attached(owner: np.ndarray, anchors: FloatArray, axes: Axes) -> np.ndarray:
@@ -64,7 +50,7 @@ def _attached(owner: np.ndarray, anchors: FloatArray, axes: Axes) -> np.ndarray:
         asked[leaves[:: -(-len(leaves) // ASKED)]] = True
         rows = order[asked[owner[order]]]  # leaf by leaf, each face by face
         edges = (3 * rows[:, None] + np.arange(3)).ravel()
-        cost = nearest_tubes(anchors[edges], axes)[1].reshape(-1, 3 * faces)
+        cost = axes.nearest_tubes(anchors[edges])[1].reshape(-1, 3 * faces)
         wins = np.bincount(cost.argmin(axis=1), minlength=3 * faces)
         rows = np.flatnonzero(faces_of == faces)
         may[rows] = (wins >= OFTEN * wins.max())[slot[rows]]
