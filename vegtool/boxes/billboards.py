@@ -74,10 +74,12 @@ def planes_per_box(boxes: Boxes, options: BoxOptions) -> IntArray:
     longest, middle, least = boxes.half.T
     if options.shape == "single":
         return np.ones(len(boxes), dtype=np.int32)
-    crossed = np.where(ratio(middle, longest) < options.long_ratio, 2, 3)
-    if options.shape == "auto":
-        crossed = np.where(ratio(least, middle) < options.flat_ratio, 1, crossed)
-    return crossed.astype(np.int32)
+    long_thin = ratio(middle, longest) < options.long_ratio
+    if options.shape == "crossed":
+        return np.where(long_thin, 2, 3).astype(np.int32)
+    flat = ratio(least, middle) < options.flat_ratio
+    compact = 1 if options.plane == "orientation" else 3
+    return np.where(flat, 1, np.where(long_thin, 2, compact)).astype(np.int32)
 
 
 def ratio(short: FloatArray, long: FloatArray) -> FloatArray:

@@ -14,7 +14,7 @@ import numpy as np
 from vegtool.arrays import FloatArray, IntArray
 from vegtool.boxes.billboards import cluster_boxes, cut_planes, planes_per_box, ratio
 from vegtool.boxes.box import Boxes
-from vegtool.boxes.options import BoxOptions
+from vegtool.boxes.options import BoxOptions, PlaneFit, Shape
 from vegtool.errors import UsageError
 from vegtool.lod import Billboards
 from vegtool.plant import Plant
@@ -23,6 +23,15 @@ MAX_CALLS = 3
 """Clusterings tried at most."""
 SLACK = 0.1
 """Fraction of the budget that may be missed, or trimmed, without another clustering."""
+USUAL_PLANES: dict[tuple[Shape, PlaneFit], float] = {
+    ("single", "volume"): 1.0,
+    ("single", "orientation"): 1.0,
+    ("auto", "volume"): 3.0,
+    ("auto", "orientation"): 1.02,
+    ("crossed", "volume"): 3.0,
+    ("crossed", "orientation"): 3.0,
+}
+"""Planes per cluster of real trees: where the search for the number of clusters starts."""
 
 
 def fit_budget(
@@ -41,7 +50,7 @@ def fit_budget(
     if budget < 1:
         raise UsageError(f"expected a budget of at least 1 billboard, got {budget}")
     tried: dict[int, tuple[IntArray, Boxes, IntArray]] = {}
-    asked = budget if options.shape == "single" else max(budget // 3, 1)
+    asked = max(round(budget / USUAL_PLANES[options.shape, options.plane]), 1)
     while asked not in tried and len(tried) < MAX_CALLS:
         labels = cluster_fn(asked)
         boxes = cluster_boxes(plant, labels, int(labels.max()) + 1, options)

@@ -1,4 +1,4 @@
-"""How far billboards draw a plant's surface from where it is: DESIGN, section 7."""
+"""How far billboards draw a plant's surface from where it is: `geometric_error_m`."""
 
 from __future__ import annotations
 

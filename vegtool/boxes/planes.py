@@ -1,6 +1,6 @@
 """Boxes about the plane that suits both the places and the directions of a cluster's faces.
 
-DESIGN, section 4 item 2 (measured there against the paper's boxes of least volume). The normal is
+Measured against the boxes of least volume in docs/methods/boxes.md. The normal is
 the eigenvector with the smallest eigenvalue of
 
     scatter / trace(scatter)  -  mean of n n^T over the area
