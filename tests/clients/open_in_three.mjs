@@ -1,18 +1,19 @@
 // three.js in headless Chromium: opens .glb files with GLTFLoader and draws them.
-// stdin: {size, views: [[x, y, z], ...], jobs: [{file, center, radius, samples}, ...]}
-//   size: pixels of the square image, a multiple of 8; samples: drawn that many times as large,
-//   then averaged; views: directions from the centre to the camera.
+// stdin: {cells, cover, views: [[x, y, z], ...], jobs: [{file, center, radius, pixels}, ...]}
+//   The picture is a square of cells * cells, each drawn with pixels * pixels pixels.
+//   views: directions from the centre to the camera; center, radius: metres, what is in view.
 // stdout: one JSON object per line and job,
 //   {file, triangles, textures, complaints, silhouettes: [base64, one per view]}
-//   or {file, error, complaints}. A silhouette is size * size bits, top row first, highest bit
-//   first: 1 where alpha is at least one half. One browser and one page serve all jobs.
+//   or {file, error, complaints}. A silhouette is cells * cells bits, top row first, highest bit
+//   first: 1 where at least the share `cover` of the cell's pixels is drawn.
+// One browser and one page serve all jobs.
 import fs from 'node:fs';
 import http from 'node:http';
 import os from 'node:os';
 import path from 'node:path';
 import {folder, load, readInput} from './packages.mjs';
 
-const {size, views, jobs} = await readInput();
+const {cells, cover, views, jobs} = await readInput();
 const puppeteer = load('puppeteer-core');
 
 const page = `<!doctype html>
@@ -26,17 +27,16 @@ const script = `
 import * as THREE from 'three';
 import {GLTFLoader} from 'three/addons/loaders/GLTFLoader.js';
 
-const size = ${size}, views = ${JSON.stringify(views)};
+const cells = ${cells}, cover = ${cover}, views = ${JSON.stringify(views)};
 const FOV = 30;
 const renderer = new THREE.WebGLRenderer({alpha: true, antialias: false});
 renderer.setPixelRatio(1);
-renderer.setSize(size, size);
 renderer.setClearColor(0x000000, 0);
 
-function silhouette(scene, direction, center, radius, samples) {
-  const wide = size * samples;
-  const target = new THREE.WebGLRenderTarget(wide, wide);
-  const pixels = new Uint8Array(4 * wide * wide);
+function silhouette(scene, direction, center, radius, pixels) {
+  const size = cells * pixels;
+  const target = new THREE.WebGLRenderTarget(size, size);
+  const rgba = new Uint8Array(4 * size * size);
   const camera = new THREE.PerspectiveCamera(FOV, 1, radius / 100, radius * 10);
   const distance = radius / Math.sin(THREE.MathUtils.degToRad(FOV / 2));
   const away = new THREE.Vector3(...direction).normalize();
@@ -46,19 +46,22 @@ function silhouette(scene, direction, center, radius, samples) {
   renderer.setRenderTarget(target);
   renderer.clear();
   renderer.render(scene, camera);
-  renderer.readRenderTargetPixels(target, 0, 0, wide, wide, pixels);
+  renderer.readRenderTargetPixels(target, 0, 0, size, size, rgba);
   target.dispose();
-  const alpha = new Float64Array(size * size);
-  for (let i = 0; i < wide * wide; i++) {
-    const row = Math.floor((wide - 1 - Math.floor(i / wide)) / samples);  // GL starts at the bottom
-    alpha[row * size + Math.floor(i % wide / samples)] += pixels[4 * i + 3] / samples ** 2;
+  const drawn = new Uint32Array(cells * cells);
+  for (let i = 0; i < size * size; i++) {
+    const row = size - 1 - Math.floor(i / size);  // GL's first row is the lowest
+    const cell = Math.floor(row / pixels) * cells + Math.floor(i % size / pixels);
+    if (rgba[4 * i + 3] >= 128) drawn[cell] += 1;
   }
-  const bits = new Uint8Array(size * size / 8);
-  alpha.forEach((value, i) => { if (value >= 127.5) bits[i >> 3] |= 128 >> (i & 7); });
+  const bits = new Uint8Array(cells * cells / 8);
+  drawn.forEach((count, i) => {
+    if (count >= cover * pixels * pixels) bits[i >> 3] |= 128 >> (i & 7);
+  });
   return btoa(String.fromCharCode(...bits));
 }
 
-window.draw = async ({url, center, radius, samples}) => {
+window.draw = async ({url, center, radius, pixels}) => {
   const {scene: model} = await new GLTFLoader().loadAsync(url);
   const scene = new THREE.Scene();
   scene.add(model, new THREE.HemisphereLight(0xffffff, 0x888888, 3));
@@ -70,7 +73,7 @@ window.draw = async ({url, center, radius, samples}) => {
     for (const value of Object.values(node.material)) if (value?.isTexture) textures.add(value);
   });
   const middle = new THREE.Vector3(...center);
-  const silhouettes = views.map((view) => silhouette(scene, view, middle, radius, samples));
+  const silhouettes = views.map((view) => silhouette(scene, view, middle, radius, pixels));
   model.traverse((node) => { if (node.isMesh) { node.geometry.dispose(); node.material.dispose(); } });
   for (const texture of textures) texture.dispose();
   return {triangles, textures: textures.size, silhouettes};

@@ -35,12 +35,17 @@ BROWSERS = (
 )
 BROWSER = next(filter(None, map(shutil.which, filter(None, BROWSERS))), None)
 
-SIZE = 256  # pixels; the first billboard level is made for a plant about this large
-SAMPLES_OF_ORIGINAL = 3  # along each side of a pixel: a live original loses leaves to mip-mapping
+# A silhouette is a grid of cells, of which those count that are covered by a quarter at least: the
+# outline of a crown, not of each leaf. Four pixels to a cell make a plant about 250 pixels high,
+# for which the first billboard level is made. The original has twice as many, because three.js
+# would lose half of its leaves to mip-mapping.
+CELLS = 112
+COVER = 0.25
+PIXELS_OF_LEVEL, PIXELS_OF_ORIGINAL = 4, 8
 VIEWS = [[1, 0.2, 0], [0, 0.2, 1], [-1, 0.2, 0], [0, 0.2, -1], [1, 1, 1], [0, 1, 0.01]]
-LEAST_AREA = 100  # pixels of the original: a card seen from its edge has no silhouette to compare
+LEAST_AREA = 20  # cells of the original: a card seen from its edge has no silhouette to compare
 LEAST_OVERLAP = 0.5  # intersection over union of the silhouettes of original and level 1
-LEAST_COVER = 0.25  # of the original's silhouette, for a coarser level to count as the plant
+LEAST_COVER = 0.25  # of the area of the original's silhouette, mean over the views, for any level
 SAME_MODEL = 0.95  # intersection over union of the user's own file and level 0
 
 
@@ -62,7 +67,7 @@ pytestmark = [
 
 
 def sources() -> dict[str, Path | None]:
-    """The real plants where their folder is here, else our own samples (still to be written)."""
+    """The real plants where their folder is here, else our samples, still to be grown (None)."""
     models = sorted(p for p in MODELS.rglob("*") if p.suffix.lower() in READERS)
     if models:
         return {str(path.relative_to(MODELS)): path for path in models}
@@ -159,19 +164,24 @@ def validated(written: dict[str, Written]) -> dict[Path, dict[str, Any]]:
 
 @pytest.fixture(scope="session")
 def drawn(written: dict[str, Written]) -> dict[Path, dict[str, Any]]:
-    """Every file as three.js draws it, seen like its original; silhouettes are (views, h, w)."""
+    """Every file as three.js draws it, seen like its original.
+
+    Silhouettes are bool (views, CELLS, CELLS).
+    """
     jobs = []
     for name, each in written.items():
         center, radius = frame(each.combined)
         originals = [each.combined, *([each.source] if stands_for_itself(SOURCES[name]) else [])]
         for file in (*originals, *each.levels):
-            samples = SAMPLES_OF_ORIGINAL if file in originals else 1
-            jobs.append({"file": str(file), "center": center, "radius": radius, "samples": samples})
-    answers = node("open_in_three.mjs", {"size": SIZE, "views": VIEWS, "jobs": jobs})
+            pixels = PIXELS_OF_ORIGINAL if file in originals else PIXELS_OF_LEVEL
+            jobs.append({"file": str(file), "center": center, "radius": radius, "pixels": pixels})
+    answers = node(
+        "open_in_three.mjs", {"cells": CELLS, "cover": COVER, "views": VIEWS, "jobs": jobs}
+    )
     for answer in answers:
         packed = [base64.b64decode(s) for s in answer.get("silhouettes", [])]
         bits = np.unpackbits(np.frombuffer(b"".join(packed), np.uint8)).astype(bool)
-        answer["silhouettes"] = bits.reshape(-1, SIZE, SIZE)
+        answer["silhouettes"] = bits.reshape(-1, CELLS, CELLS)
     return {Path(answer["file"]): answer for answer in answers}
 
 
@@ -213,7 +223,7 @@ def test_three_opens_and_draws_every_file(source, written, drawn):
         assert "error" not in answer, (file.name, answer["error"])
         assert answer["complaints"] == [], file.name
         cover = answer["silhouettes"].sum(axis=(1, 2))[seen] / area[seen]
-        assert cover.min() >= LEAST_COVER, (file.name, cover)
+        assert cover.mean() >= LEAST_COVER, (file.name, cover)
 
 
 @pytest.mark.parametrize("source", SOURCES)
