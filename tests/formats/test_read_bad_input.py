@@ -168,6 +168,16 @@ def test_node_cycles_and_shared_children(tmp_path: Path) -> None:
     refused(changed(tmp_path, bomb), "one parent")
 
 
+def test_too_many_instances_are_refused_before_they_are_made(tmp_path: Path) -> None:
+    """1,000 instances of a mesh of 40,000 triangles that names one triangle again and again."""
+    made = Gltf()
+    mesh = made.mesh(indices=np.tile(np.array([0, 1, 2], np.uint16), 40_000))
+    move = made.array(np.zeros((1000, 3), np.float32))
+    instancing = {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": move}}}
+    made.node(mesh=mesh, extensions=instancing)
+    refused(made.write(tmp_path / "forest.glb"), "40000000", "landscape")
+
+
 def test_deep_node_chain_is_no_problem(tmp_path: Path) -> None:
     def chain(tree: dict[str, Any]) -> None:
         tree["nodes"] = [{"children": [k + 1]} for k in range(5000)] + [{"mesh": 0}]

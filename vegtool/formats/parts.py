@@ -3,16 +3,31 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from vegtool.arrays import FloatArray
+from vegtool.errors import InputError
 from vegtool.plant import Material
 
 IndexArray = npt.NDArray[np.integer[Any]]
 """Indices of any integer type: files have their own, a Plant has int32."""
+
+
+MAX_FACES = 30_000_000
+"""More than that is a landscape, or an attack by instances."""
+
+
+def check_face_count(path: Path, count: int) -> None:
+    """Refuse more triangles than MAX_FACES, before they are made."""
+    if count > MAX_FACES:
+        raise InputError(
+            f"{path}: expected at most {MAX_FACES} triangles, found {count} or more; read one "
+            "plant, not a landscape"
+        )
 
 
 @dataclass(frozen=True, eq=False)

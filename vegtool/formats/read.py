@@ -21,15 +21,13 @@ from vegtool.formats.clean import (
     smooth_normals,
 )
 from vegtool.formats.declared import resolve_branches
-from vegtool.formats.parts import IndexArray, Parsed, Part
+from vegtool.formats.parts import IndexArray, Parsed, Part, check_face_count
 from vegtool.formats.roles import guess_role, named_roles
 from vegtool.formats.upright import UPRIGHT, guess_up, turned
 from vegtool.plant import Material, Plant
 
 Mask = npt.NDArray[np.bool_]
 
-MAX_FACES = 30_000_000
-"""More than that is a landscape, or an attack by instances of instances."""
 SHORTEST_NORMAL = 1e-6
 """A stored normal shorter than this says nothing."""
 WIDEST_UV = 1e9
@@ -86,11 +84,7 @@ def _join(parts: list[Part], path: Path) -> _Mesh:
     counts = np.array([len(part.faces) for part in parts])
     if counts.sum() == 0:
         raise InputError(f"{path}: expected triangles, found none; export the plant as a mesh")
-    if counts.sum() > MAX_FACES:
-        raise InputError(
-            f"{path}: expected at most {MAX_FACES} triangles, found {counts.sum()}; read one "
-            "plant, not a landscape"
-        )
+    check_face_count(path, int(counts.sum()))
     start = np.cumsum(sizes) - sizes
     positions = np.concatenate([part.positions for part in parts])
     usable = finite_vertices(positions)

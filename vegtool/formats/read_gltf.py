@@ -19,8 +19,7 @@ from vegtool.formats.clean import finite_vertices
 from vegtool.formats.gltf_data import GltfFile, meshopt_missing, open_gltf
 from vegtool.formats.gltf_material import UvSource, read_materials
 from vegtool.formats.gltf_nodes import Node, scene_nodes
-from vegtool.formats.parts import Declared, IndexArray, Parsed, Part
-from vegtool.formats.upright import turned
+from vegtool.formats.parts import Declared, IndexArray, Parsed, Part, check_face_count
 from vegtool.formats.vertex_colors import settle_colors
 
 UNDERSTOOD = {
@@ -91,17 +90,21 @@ def _parse(file: GltfFile) -> Parsed:
     meshes: dict[int, list[_Primitive]] = {}
     parts: list[Part] = []
     tags: list[dict[str, IndexArray]] = []
+    count = 0
     for node in nodes.values():
         if node.mesh is None:
             continue
         if node.mesh not in meshes:
             meshes[node.mesh] = _read_mesh(file, node.mesh, uv_sources, textured, notes)
         for primitive in meshes[node.mesh]:
-            for part in _place(file, nodes, node, primitive):
-                parts.append(part)
-                tags.append(primitive.tags)
+            copies = 1 if node.instances is None else len(node.instances)
+            count += copies * len(primitive.part.faces)
+            check_face_count(file.path, count)
+            parts.append(_place(file, nodes, node, primitive))
+            tags.append(primitive.tags)
     drawn = [node.mesh for node in nodes.values() if node.mesh is not None]
-    declared, parts = _declared(file, nodes, parts, tags, len(drawn) == len(set(drawn)))
+    once = len(drawn) == len(set(drawn)) and all(n.instances is None for n in nodes.values())
+    declared, parts = _declared(file, nodes, parts, tags, once)
     if file.json.get("animations"):
         notes.append("animations are left out; the plant is drawn at rest")
     return Parsed(
@@ -293,32 +296,37 @@ def _joined(attributes: dict[str, np.ndarray], kind: str) -> np.ndarray | None:
     return np.concatenate(sets, axis=1) if sets else None
 
 
-def _place(file: GltfFile, nodes: dict[int, Node], node: Node, primitive: _Primitive) -> list[Part]:
+def _place(file: GltfFile, nodes: dict[int, Node], node: Node, primitive: _Primitive) -> Part:
     """The primitive in world space, once per instance; its branch is its node or its joint."""
     part = replace(primitive.part, name=f"{node.name} {primitive.part.name}".strip())
     if node.skin is not None and primitive.joints is not None and primitive.weights is not None:
-        return [_skinned(file, nodes, node, part, primitive.joints, primitive.weights)]
-    part = replace(part, branch=node.index)
-    if node.instances is None:
-        return [_moved(part, node.world)]
-    return [_moved(part, node.world @ instance) for instance in node.instances]
+        return _skinned(file, nodes, node, part, primitive.joints, primitive.weights)
+    instances = np.eye(4)[None] if node.instances is None else node.instances
+    return replace(_copied(part, node.world @ instances), branch=node.index)
 
 
-def _moved(part: Part, matrix: FloatArray) -> Part:
-    """The part under an affine transform. A mirror turns its triangles round."""
-    if np.array_equal(matrix, np.eye(4)):
+def _copied(part: Part, matrices: FloatArray) -> Part:
+    """The part under each of (n, 4, 4) affine transforms. A mirror turns its triangles round."""
+    if np.array_equal(matrices, np.eye(4)[None]):
         return part
-    linear = matrix[:3, :3]
-    mirrored = np.linalg.det(linear) < 0
-    cofactors = np.cross(linear[[1, 2, 0]], linear[[2, 0, 1]]) * (-1 if mirrored else 1)
+    linear = matrices[:, :3, :3]
+    sign = np.where(np.linalg.det(linear) < 0, -1, 1)
+    cofactors = np.cross(linear[:, [1, 2, 0]], linear[:, [2, 0, 1]]) * sign[:, None, None]
     with np.errstate(invalid="ignore", over="ignore"):  # broken coordinates, dropped later
-        positions = turned(part.positions, linear) + matrix[:3, 3]
-        normals = None if part.normals is None else turned(part.normals, cofactors)
+        positions = np.einsum("nij,vj->nvi", linear, part.positions) + matrices[:, None, :3, 3]
+        normals = None
+        if part.normals is not None:
+            normals = np.einsum("nij,vj->nvi", cofactors, part.normals).reshape(-1, 3)
+    faces = np.where(sign[:, None, None] < 0, part.faces[:, ::-1], part.faces)
+    first = len(part.positions) * np.arange(len(matrices))[:, None, None]
+    copies = (len(matrices), 1)
     return replace(
         part,
-        positions=positions,
+        positions=positions.reshape(-1, 3),
         normals=normals,
-        faces=part.faces[:, ::-1] if mirrored else part.faces,
+        uvs=None if part.uvs is None else np.tile(part.uvs, copies),
+        colors=None if part.colors is None else np.tile(part.colors, copies),
+        faces=(faces + first).reshape(-1, 3),
     )
 
 
