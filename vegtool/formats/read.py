@@ -14,11 +14,12 @@ from vegtool.arrays import FloatArray, unit
 from vegtool.errors import InputError
 from vegtool.formats import ReadOptions
 from vegtool.formats.clean import (
-    finite_vertices,
+    bounds,
     flat_faces,
     last_face_normals,
     repeated_faces,
     smooth_normals,
+    usable_rows,
 )
 from vegtool.formats.declared import resolve_branches
 from vegtool.formats.parts import IndexArray, Parsed, Part, check_face_count
@@ -87,12 +88,14 @@ def _join(parts: list[Part], path: Path) -> _Mesh:
     check_face_count(path, int(counts.sum()))
     start = np.cumsum(sizes) - sizes
     positions = np.concatenate([part.positions for part in parts])
-    usable = finite_vertices(positions)
+    usable = usable_rows(positions)
+    if not usable.all():
+        positions = np.where(usable[:, None], positions, np.inf)
     if not usable.any():
         raise InputError(
             f"{path}: expected coordinates, found only NaN or infinite ones; export it again"
         )
-    origin = 0.5 * (positions[usable].min(axis=0) + positions[usable].max(axis=0))
+    origin = bounds(positions if usable.all() else positions[usable]).mean(axis=0)
     colored = any(part.colors is not None for part in parts)
 
     def or_else(value: FloatArray | None, part: Part, width: int, fill: float) -> FloatArray:
@@ -105,7 +108,7 @@ def _join(parts: list[Part], path: Path) -> _Mesh:
         base += int(point.max(initial=-1)) + 1
     return _Mesh(
         origin=origin,
-        positions=np.where(usable[:, None], positions, np.inf) - origin,
+        positions=positions - origin,
         normals=np.concatenate([or_else(p.normals, p, 3, 0.0) for p in parts]),
         uvs=np.concatenate([or_else(p.uvs, p, 2, 0.0) for p in parts]),
         colors=np.concatenate([or_else(p.colors, p, 4, 1.0) for p in parts]) if colored else None,
@@ -119,19 +122,17 @@ def _join(parts: list[Part], path: Path) -> _Mesh:
 
 def _drop_broken_faces(mesh: _Mesh, path: Path, notes: list[str]) -> _Mesh:
     """Without faces that use broken coordinates, have no area or repeat another."""
-    usable: Mask = np.asarray(np.isfinite(mesh.positions).all(axis=1))
-    laid = np.asarray((np.abs(np.nan_to_num(mesh.uvs, nan=np.inf)) < WIDEST_UV).all(axis=1))
+    total = len(mesh.faces)
+    usable = usable_rows(mesh.positions)
+    if not usable.all():
+        mesh = replace(mesh, positions=np.where(usable[:, None], mesh.positions, 0.0))
+    laid = usable_rows(mesh.uvs, WIDEST_UV)
     if not laid.all():
         notes.append(f"set {(~laid).sum()} NaN or infinite texture coordinates to 0")
-    total = len(mesh.faces)
-    mesh = replace(
-        mesh,
-        positions=np.where(usable[:, None], mesh.positions, 0.0),
-        uvs=np.where(laid[:, None], mesh.uvs, 0.0),
-    )
+        mesh = replace(mesh, uvs=np.where(laid[:, None], mesh.uvs, 0.0))
     found = {}
     steps: tuple[tuple[str, Callable[[_Mesh], Mask]], ...] = (
-        ("with NaN or infinite coordinates", lambda m: np.asarray(~usable[m.faces].all(axis=1))),
+        ("with NaN or infinite coordinates", lambda m: _use_any(m.faces, ~usable)),
         ("without area", lambda m: flat_faces(m.positions, m.faces)),
         ("repeated", lambda m: repeated_faces(m.positions, m.uvs, m.faces, m.material)),
     )
@@ -148,6 +149,13 @@ def _drop_broken_faces(mesh: _Mesh, path: Path, notes: list[str]) -> _Mesh:
                 "model again"
             )
     return mesh
+
+
+def _use_any(faces: IndexArray, marked: Mask) -> Mask:
+    """(f,) bool: faces that use a marked vertex."""
+    if not marked.any():
+        return np.zeros(len(faces), dtype=np.bool_)
+    return np.asarray(marked[faces].any(axis=1))
 
 
 def _with_normals(mesh: _Mesh, notes: list[str]) -> _Mesh:

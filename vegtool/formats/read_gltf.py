@@ -15,7 +15,7 @@ import numpy as np
 
 from vegtool.arrays import FloatArray
 from vegtool.errors import CapabilityError, InputError
-from vegtool.formats.clean import finite_vertices
+from vegtool.formats.clean import bounds, usable_rows
 from vegtool.formats.gltf_data import GltfFile, meshopt_missing, open_gltf
 from vegtool.formats.gltf_material import UvSource, read_materials
 from vegtool.formats.gltf_nodes import Node, scene_nodes
@@ -245,11 +245,11 @@ def _warn_of_rounding(positions: np.ndarray, name: str, notes: list[str]) -> Non
     """Note where 32-bit coordinates lie so far from 0 that a plant's detail is rounded away."""
     if positions.dtype != np.float32 or not len(positions):
         return
-    usable = _floats(positions)[finite_vertices(_floats(positions))]
-    if not len(usable):
-        return
-    step = float(np.abs(usable).max()) * FLOAT32_STEP
-    if step > COARSE * float(np.ptp(usable, axis=0).max()):
+    low, high = bounds(positions)
+    if not usable_rows(_floats(np.array([low, high]))).all():
+        return  # broken vertices are another matter
+    step = float(np.abs([low, high]).max()) * FLOAT32_STEP
+    if step > COARSE * float((high - low).max()):
         notes.append(
             f"mesh {name}: its coordinates are so large that the file rounds them to steps of "
             f"{step:.2g}; export it near its own origin and place it by its node"
