@@ -1,40 +1,66 @@
-"""k-means on faces: the smallest cases, then the objective against scikit-learn's."""
+"""k-means: its objective against scikit-learn's."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+from cluster_cases import cards, inertia, plant_of
 
 from vegtool.clustering import ClusterOptions, cluster
-from vegtool.errors import UsageError
-from vegtool.plant import Material, Plant
+from vegtool.clustering.features import face_features, face_weights, quads
+from vegtool.plant import Plant
 
 
-def plant_of(corners: np.ndarray) -> Plant:
-    """A plant from (f, 3, 3) corners, as a triangle soup."""
-    n = 3 * len(corners)
-    return Plant(
-        name="test",
-        positions=corners.reshape(-1, 3),
-        normals=np.tile([0.0, 1.0, 0.0], (n, 1)),
-        uvs=np.zeros((n, 2)),
-        faces=np.arange(n, dtype=np.int32).reshape(-1, 3),
-        face_material=np.zeros(len(corners), dtype=np.int32),
-        materials=(Material("leaf", role="leaf"),),
-    )
+def reference(plant: Plant, weight: float, count: int) -> np.ndarray:
+    """scikit-learn's labels for the same objective, one start."""
+    from sklearn.cluster import KMeans
+
+    points = face_features(plant, ClusterOptions(weight).orientation_scale(count))
+    means = KMeans(count, n_init=1, random_state=0)
+    return np.asarray(means.fit(points, sample_weight=face_weights(plant)).labels_)
 
 
-def test_two_far_triangles_are_two_clusters() -> None:
-    triangle = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
-    plant = plant_of(np.stack([triangle, triangle + 5, triangle + [0.1, 0, 0]]))
-    assert cluster(plant, "kmeans", 2).tolist() == [0, 1, 0]
+@pytest.mark.parametrize("weight", [0.0, 0.12])
+@pytest.mark.parametrize("count", [3, 40, 300])
+def test_error_is_no_worse_than_scikit_learns(count: int, weight: float) -> None:
+    plant = plant_of(cards(1_000))
+    ours = cluster(plant, "kmeans", count, ClusterOptions(weight))
+    theirs = inertia(plant, reference(plant, weight, count), weight, count)
+    assert inertia(plant, ours, weight, count) <= 1.03 * theirs
 
 
-def test_unknown_method_names_the_choices() -> None:
-    plant = plant_of(np.eye(3)[None])
-    with pytest.raises(UsageError, match="kmeans"):
-        cluster(plant, "k-means", 2)
-    with pytest.raises(UsageError, match="at least 1"):
-        cluster(plant, "kmeans", 0)
-    with pytest.raises(UsageError, match="orientation weight"):
-        ClusterOptions(orientation_weight=float("nan"))
+def test_error_is_no_worse_through_the_grid() -> None:
+    """40,000 cards are more points than it works on at once."""
+    plant = plant_of(cards(40_000, size=0.02))
+    ours = cluster(plant, "kmeans", 20)
+    theirs = inertia(plant, reference(plant, 0.12, 20), 0.12, 20)
+    assert inertia(plant, ours, 0.12, 20) <= 1.03 * theirs
+
+
+@pytest.mark.models
+@pytest.mark.parametrize("name", ["eztree_ash_small", "eztree_pine_medium"])
+@pytest.mark.parametrize("count", [67, 600])
+def test_error_is_no_worse_on_real_plants(models: Path, name: str, count: int) -> None:
+    from vegtool.formats import read_plant
+
+    plant = read_plant(models / name / f"{name}.glb")
+    ours = cluster(plant, "kmeans", count)
+    theirs = inertia(plant, reference(plant, 0.12, count), 0.12, count)
+    assert inertia(plant, ours, 0.12, count) <= 1.03 * theirs
+
+
+def test_quads_are_pairs_by_position() -> None:
+    """Unindexed halves of a card are one piece; a third face on another edge is not."""
+    card = cards(1)
+    edge = card[0, :2]
+    third = np.concatenate([edge, card[0, 2:] + 5.0])[None]
+    assert quads(plant_of(np.concatenate([card, third]))).tolist() == [0, 0, 1]
+
+
+def test_bent_pairs_are_two_pieces() -> None:
+    """Two faces that share their longest edge at a right angle face different ways."""
+    a, b = np.zeros(3), np.array([2.0, 0, 0])
+    roof = np.stack([[a, b, [1.0, 1, 0]], [a, b, [1.0, 0, 1]]])
+    assert quads(plant_of(roof)).tolist() == [0, 1]

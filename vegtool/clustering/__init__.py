@@ -38,7 +38,7 @@ class ClusterOptions:
     the count unused.
     """
 
-    orientation_weight: float = 0.1
+    orientation_weight: float = 0.12
     elongation: float = 2.0
     strict_level: bool = False
 
@@ -50,7 +50,7 @@ class ClusterOptions:
         if not 0 <= self.orientation_weight <= 1e3:
             raise UsageError(
                 f"orientation weight: expected 0 to 1000 plant radii, got {self.orientation_weight}"
-                "; 0 clusters by position alone, 0.1 is the default"
+                "; 0 clusters by position alone, 0.12 is the default"
             )
         if not 1 <= self.elongation <= 1e3:
             raise UsageError(

@@ -17,13 +17,12 @@ import numpy as np
 from vegtool.arrays import IntArray
 from vegtool.clustering import ClusterOptions
 from vegtool.clustering.features import coarse, samples, spread_to
-from vegtool.clustering.kmeans import CELLS, settle
+from vegtool.clustering.kmeans import settle
 from vegtool.clustering.partition import compacted, merge
 from vegtool.plant import Branches, Plant
 from vegtool.progress import Progress
 
-
-PER_BRANCH = 4  # clusters for each branch, on average: leaves of one branch face many ways
+PER_BRANCH = 8  # clusters per branch, on average: the leaves of one branch face many ways
 
 
 def branches(
@@ -40,7 +39,7 @@ def branches(
     if covered == count or (covered < count and options.strict_level):
         return group.astype(np.int32)
     fine = samples(plant, options.orientation_scale(count), count, group)
-    few = coarse(fine, max(CELLS, 8 * count), group)
+    few = coarse(fine, count, group)
     of_point = spread_to(few.of_face, group)
     if covered > count:  # more trunks than clusters
         labels = merge(few.points, few.weights, of_point, count)

@@ -23,6 +23,9 @@ from vegtool.plant import Plant
 SAME = 1e-9  # plant radii: features closer than this, per axis, are the same
 PARALLEL = 0.99  # cosine: halves of a quad may be bent by 8 degrees
 LIGHTEST = 1e-6  # of the mean face: the weight of faces without area
+CELLS = 1 << 14  # points that clustering works on
+CELLS_PER_CLUSTER = 8  # at least, where the count is large
+FIRST_EDGE = 1 / 128  # plant radii: suits trees of 100,000 triangles and more
 
 Labels = npt.NDArray[np.int64]
 
@@ -76,13 +79,23 @@ def samples(
     return _grouped(features, weights, cells(features, SAME, group))
 
 
-def coarse(fine: Samples, limit: int, group: Labels | None = None) -> Samples:
-    """`fine` with the points that share a grid cell made one, if there are more than `limit`."""
-    edge, result = 1 / 128, fine
-    while len(result.points) > limit and edge < 1:
+def coarse(fine: Samples, count: int, group: Labels | None = None) -> Samples:
+    """`fine` with the points that share a grid cell made one, where there are very many.
+
+    At most CELLS points, more for a large count; at least as many as clusters are asked for.
+    """
+    limit = max(CELLS, CELLS_PER_CLUSTER * count)
+    if len(fine.points) <= limit:
+        return fine
+    edge, widest = FIRST_EDGE, 2 * float(np.abs(fine.points).max())
+    result = coarser(fine, edge, group)
+    while len(result.points) < limit // 4 and edge > SAME:  # the plant huddles in few cells
+        edge /= 2
         result = coarser(fine, edge, group)
+    while len(result.points) > limit and edge < widest:
         edge *= 1.25
-    return result
+        result = coarser(fine, edge, group)
+    return result if len(result.points) >= count else fine
 
 
 def coarser(fine: Samples, edge: float, group: Labels | None = None) -> Samples:

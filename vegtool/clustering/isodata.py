@@ -19,20 +19,28 @@ nothing in the last round. So it always ends, however split and merge may undo e
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import sqrt
+from math import ceil, sqrt
 
 import numpy as np
 
 from vegtool.arrays import FloatArray, IntArray
 from vegtool.clustering import ClusterOptions
 from vegtool.clustering.features import Labels, coarse, samples
-from vegtool.clustering.partition import compacted, cut, disjoint_pairs, fill, means, split
+from vegtool.clustering.partition import (
+    compacted,
+    cut,
+    disjoint_pairs,
+    fill,
+    means,
+    pairs_per_round,
+    rounds_for,
+    split,
+)
 from vegtool.plant import Plant
 from vegtool.progress import Progress
 
-CELLS = 1 << 14  # points to work on; more, where the count is large
-ROUNDS = 8
-EXCHANGE = 0.25  # of the count, split and merged again in the first round
+ROUNDS = 4
+EXCHANGE = 1.0  # of the count, split and merged again in the first round
 NEAR = 12  # clusters next to its own that a point may move to, or a cluster merge with
 
 
@@ -58,17 +66,18 @@ def isodata(
 ) -> IntArray:
     """(f,) int32 labels of at most `count` long and thin clusters. No random choice is made."""
     fine = samples(plant, options.orientation_scale(count), count)
-    few = coarse(fine, limit=max(CELLS, 8 * count))
+    few = coarse(fine, count)
     points, weights = few.points, few.weights
     gain = 1 - 1 / options.elongation**2  # share of the squared distance along a line that is free
     labels = split(points, weights, np.zeros(len(points), dtype=np.int64), count)
-    for remaining in range(ROUNDS, -1, -1):
+    rounds = rounds_for(count, ROUNDS)
+    for remaining in range(rounds, -1, -1):
         labels = move(points, weights, labels, gain)
-        surplus = int(EXCHANGE * count * remaining / ROUNDS)
+        surplus = ceil(EXCHANGE * count * remaining / rounds)
         labels = split_wide(points, weights, labels, gain, min(count + surplus, len(points)))
         labels = move(points, weights, labels, gain)
         labels = merge_collinear(points, weights, labels, gain, count)
-        progress("isodata", 1 - remaining / (ROUNDS + 1))
+        progress("isodata", 1 - remaining / (rounds + 1))
     labels = fill(points, weights, labels, count)
     return np.asarray(labels[few.of_face], dtype=np.int32)
 
@@ -142,7 +151,8 @@ def merge_collinear(
         clusters = lines(points, weights, labels, gain)
         near = neighbours(clusters.center)
         a, b = np.repeat(np.arange(k), near.shape[1]), near.ravel()
-        a, b = a[a < b], b[a < b]
+        pair = np.unique(np.minimum(a, b)[a != b] * k + np.maximum(a, b)[a != b])
+        a, b = pair // k, pair % k
         between = clusters.center[a] - clusters.center[b]
         share = clusters.mass[a] * clusters.mass[b] / (clusters.mass[a] + clusters.mass[b])
         apart = share[:, None, None] * between[:, :3, None] * between[:, None, :3]
@@ -150,7 +160,7 @@ def merge_collinear(
         turn = clusters.turn[a] + clusters.turn[b] + share * (between[:, 3:] ** 2).sum(axis=1)
         added = line_error(moment, turn, gain) - clusters.error[a] - clusters.error[b]
         order = np.argsort(added, kind="stable")
-        into = disjoint_pairs(a[order], b[order], k, limit=(k - count + 1) // 2)
+        into = disjoint_pairs(a[order], b[order], k, limit=pairs_per_round(k, count))
         labels = compacted(into[labels])
         k = int(labels.max()) + 1
     return labels

@@ -14,11 +14,19 @@ import numpy as np
 from vegtool.arrays import IntArray
 from vegtool.clustering import ClusterOptions
 from vegtool.clustering.features import Labels, Samples, coarse, samples
-from vegtool.clustering.partition import compacted, fill, lloyd, means, merge, nearest, split
+from vegtool.clustering.partition import (
+    compacted,
+    fill,
+    lloyd,
+    means,
+    merge,
+    nearest,
+    rounds_for,
+    split,
+)
 from vegtool.plant import Plant
 from vegtool.progress import Progress
 
-CELLS = 1 << 14  # points to settle on; more, where the count is large
 OVERSHOOT = 2  # split to this many times the count before merging
 ROUNDS = 12  # Lloyd rounds at the end; more change the error by less than 0.5 %
 
@@ -28,7 +36,7 @@ def kmeans(
 ) -> IntArray:
     """(f,) int32 labels of at most `count` compact clusters."""
     fine = samples(plant, options.orientation_scale(count), count)
-    few = coarse(fine, limit=max(CELLS, 8 * count))
+    few = coarse(fine, count)
     labels = settle(few, np.zeros(len(few.points), dtype=np.int64), count)
     if few is not fine:
         exact = nearest(fine.points, means(few.points, few.weights, labels)[0])
@@ -42,4 +50,4 @@ def settle(few: Samples, labels: Labels, count: int, group: Labels | None = None
     labels = split(points, weights, labels, min(OVERSHOOT * count, len(points)))
     labels = lloyd(points, weights, labels, 2, count, group)
     labels = merge(points, weights, labels, count, group)
-    return lloyd(points, weights, labels, ROUNDS, count, group)
+    return lloyd(points, weights, labels, rounds_for(count, ROUNDS), count, group)

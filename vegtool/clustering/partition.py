@@ -17,6 +17,7 @@ from vegtool.arrays import FloatArray
 from vegtool.clustering.features import Labels, spread_to
 
 NEIGHBOURS = 8  # means next to a mean that it may merge with
+MANY = 4096  # clusters: beyond, each has few points, and two rounds of anything are enough
 
 
 def means(points: FloatArray, weights: FloatArray, labels: Labels) -> tuple[FloatArray, FloatArray]:
@@ -72,7 +73,7 @@ def merge(
 ) -> Labels:
     """Merge until there are `count` clusters: the neighbours that add the least error first.
 
-    A round merges disjoint pairs, at most half of the surplus, and then looks again.
+    A round merges disjoint pairs (`pairs_per_round`) and then looks again.
     group: (n,) clusters merge only within their group; `count` is at least the groups'.
     """
     from scipy.spatial import cKDTree
@@ -81,7 +82,8 @@ def merge(
     while k > count:
         center, mass = means(points, weights, labels)
         of_cluster = None if group is None else spread_to(labels, group)
-        center = set_apart(center, of_cluster)
+        if of_cluster is not None:
+            center = set_apart(center, of_cluster, reach_of(points))
         distance, near = cKDTree(center).query(center, k=min(NEIGHBOURS + 1, k))
         a = np.repeat(np.arange(k), near.shape[1])  # itself too, which disjoint_pairs skips
         b, squared = near.ravel(), distance.ravel() ** 2
@@ -90,10 +92,21 @@ def merge(
             a, b, squared = a[within], b[within], squared[within]
         added = squared * mass[a] * mass[b] / (mass[a] + mass[b])
         order = np.argsort(added, kind="stable")
-        into = disjoint_pairs(a[order], b[order], k, limit=(k - count + 1) // 2)
+        into = disjoint_pairs(a[order], b[order], k, limit=pairs_per_round(k, count))
         labels = compacted(into[labels])
         k = int(labels.max()) + 1
     return labels
+
+
+def rounds_for(count: int, rounds: int) -> int:
+    """`rounds`, but at most two for MANY clusters."""
+    return rounds if count <= MANY else min(rounds, 2)
+
+
+def pairs_per_round(k: int, count: int) -> int:
+    """Half of the surplus; all of it where that is a few among many, which hardly interact."""
+    surplus = k - count
+    return surplus if surplus <= count // 64 else (surplus + 1) // 2
 
 
 def disjoint_pairs(a: Labels, b: Labels, k: int, limit: int) -> Labels:
@@ -130,7 +143,8 @@ def lloyd(
             moved = nearest(points, center)
         else:
             of_cluster = spread_to(labels, group)
-            moved = nearest(set_apart(points, group), set_apart(center, of_cluster))
+            reach = reach_of(points)
+            moved = nearest(set_apart(points, group, reach), set_apart(center, of_cluster, reach))
         moved = fill(points, weights, compacted(moved), count)
         if np.array_equal(moved, labels):
             break
@@ -145,12 +159,14 @@ def nearest(points: FloatArray, center: FloatArray) -> Labels:
     return np.asarray(cKDTree(center).query(points)[1])
 
 
-def set_apart(points: FloatArray, group: Labels | None) -> FloatArray:
-    """Points with one more coordinate, which keeps groups farther apart than any two points."""
-    if group is None:
-        return points
-    reach = 2 * (1 + np.abs(points).sum(axis=1).max())
+def set_apart(points: FloatArray, group: Labels, reach: float) -> FloatArray:
+    """Points with one more coordinate, which keeps groups at least `reach` apart."""
     return np.concatenate([points, reach * group[:, None]], axis=1)
+
+
+def reach_of(points: FloatArray) -> float:
+    """More than the distance between any two points, or their means."""
+    return 4.0 * (1.0 + float(np.linalg.norm(points, axis=1).max()))
 
 
 def fill(points: FloatArray, weights: FloatArray, labels: Labels, count: int) -> Labels:
