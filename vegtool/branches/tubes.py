@@ -16,8 +16,10 @@ from vegtool.arrays import FloatArray
 from vegtool.branches.skeleton import Skeleton
 
 SPUR = 2.0  # radii: a side arm shorter than this belongs to the tube it stands on
-EVEN = 1e-4  # steps of one sweep are equal to within this fraction, tapers to this slope
-JUMP = 0.05  # and those of two differ by more
+EVEN = 1e-4  # steps of one sweep are equal to within this fraction, tapers to this slope,
+NOISE = 10.0  # or to within so many times their median change, where positions are rounded
+CURVED = 4e-3  # where the median is larger, tubes follow uneven curves and show no joints
+JUMP = 0.05  # steps or tapers of two sweeps differ by more
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,14 +96,15 @@ def _joints(rings: Skeleton, up: np.ndarray, step: FloatArray) -> np.ndarray:
     chain = np.stack([three[here], two[here], one[here], here, after[here]])
     length = step[chain[1:]]
     slope = np.diff(rings.radius[chain], axis=0) / np.maximum(length, np.finfo(float).tiny)
-
-    def even(i: int, j: int, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
-        longer = np.maximum(length[i], length[j])
-        same_step = np.abs(length[i] - length[j]) <= tolerance * longer
-        return same_step, np.abs(slope[i] - slope[j]) <= tolerance
-
-    runs = np.logical_and.reduce([*even(0, 1, EVEN), *even(2, 3, EVEN)])
-    same_step, same_slope = even(1, 2, JUMP)
+    longer = np.maximum(np.maximum(length[1:], length[:-1]), np.finfo(float).tiny)
+    # (2, 3, n): change of step and of taper; before, at and after the joint
+    change = np.abs([np.diff(length, axis=0) / longer, np.diff(slope, axis=0)])
+    noise = np.median(change, axis=(1, 2)) if len(here) else np.zeros(2)
+    if noise[0] > CURVED:
+        return np.zeros(count, dtype=bool)
+    even = np.maximum(EVEN, NOISE * noise)[:, None]
+    runs = (change[:, 0] <= even) & (change[:, 2] <= even)
+    jumps = change[:, 1] > np.maximum(JUMP, 2 * even)
     joint = np.zeros(count, dtype=bool)
-    joint[here[runs & ~(same_step & same_slope)]] = True
+    joint[here[runs.all(axis=0) & jumps.any(axis=0)]] = True
     return joint
