@@ -410,6 +410,13 @@ def test_images_by_data_uri_file_webp_and_case(tmp_path: Path) -> None:
         assert np.array_equal(texture.pixels[:, 4:], leaf_pixels()[:, 4:])
 
 
+def test_loose_images_beside_a_file_without_textures_are_named(tmp_path: Path) -> None:
+    (tmp_path / "leaf_color.png").write_bytes(png(leaf_pixels()))
+    plant = quad(tmp_path, TEXCOORD_0=QUAD_UV)
+    assert any("leaf_color.png" in note for note in plant.notes)
+    assert not any("leaf_color.png" in note for note in quad(tmp_path).notes)
+
+
 def test_material_factors(tmp_path: Path) -> None:
     material = leaf_card(tmp_path, png(SOLID), factor=(0.2, 0.4, 0.1, 1), doubleSided=True)
     assert material.materials[0].base_color.tolist() == [0.2, 0.4, 0.1, 1]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -92,6 +93,24 @@ def test_same_triangles_as_trimesh_reads(models: Path, name: str) -> None:
     plant = model(models, name)
     assert np.allclose(plant.bounds, mesh.bounds, atol=1e-5 * plant.radius)
     assert plant.face_areas.sum() == pytest.approx(mesh.area, rel=1e-5)
+
+
+@pytest.mark.parametrize("name", [n for n in EXPECTED if n.endswith(".obj")])
+def test_obj_area_against_its_plain_lines(models: Path, name: str) -> None:
+    """An oracle in plain Python: split every polygon into a fan and sum up."""
+    points, area = [], 0.0
+    for line in (models / name).read_text().splitlines():
+        kind, *words = line.split() or [""]
+        if kind == "v":
+            points.append(np.array(words[:3], dtype=float))
+        elif kind == "f":
+            a, *others = [points[int(word.split("/")[0]) - 1] for word in words]
+            for b, c in pairwise(others):
+                u, v = b - a, c - a
+                cross = (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
+                         u[0] * v[1] - u[1] * v[0])  # fmt: skip
+                area += 0.5 * float(np.sqrt(sum(x * x for x in cross)))
+    assert model(models, name).face_areas.sum() == pytest.approx(area, rel=1e-9)
 
 
 def test_leaf_textures_are_masks_and_passed_on(models: Path) -> None:

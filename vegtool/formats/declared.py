@@ -47,7 +47,9 @@ def resolve_branches(
             notes.append("the file's branch levels leave gaps; ignored")
             return None
         parent = found
-        notes.append("the file names its branches; their parents were found by the nearest surface")
+        notes.append(
+            "the file names its branches; their parents were found by what surrounds their base"
+        )
     face_branch, parent = _without_woodless(face_branch, parent, wood)
     if len(parent) < FEWEST or np.bincount(parent[parent >= 0], minlength=1).max() < 2:
         return None  # one part per level, or trunk and crown: not one part per branch

@@ -31,6 +31,7 @@ Mask = npt.NDArray[np.bool_]
 
 SHORTEST_NORMAL = 1e-6
 """A stored normal shorter than this says nothing."""
+LOOSE_IMAGES = {".png", ".jpg", ".jpeg", ".webp", ".tga"}
 WIDEST_UV = 1e9
 """Texture coordinates beyond are as broken as infinite ones."""
 
@@ -75,6 +76,7 @@ def assemble(parsed: Parsed, path: Path, options: ReadOptions) -> Plant:
         materials=_with_roles(materials, mesh, parsed.parts, options, path),
         source=str(path),
     )
+    _note_loose_images(plant, path, notes)
     branches = resolve_branches(plant, mesh.branch, parsed.declared, notes)
     return replace(plant, branches=branches, notes=tuple(notes))
 
@@ -172,6 +174,18 @@ def _with_normals(mesh: _Mesh, notes: list[str]) -> _Mesh:
         cancelled = used & ~own.any(axis=1)  # where two sides of a card share their points
         own[cancelled] = last_face_normals(mesh.positions, mesh.faces)[cancelled]
     return replace(mesh, normals=own)
+
+
+def _note_loose_images(plant: Plant, path: Path, notes: list[str]) -> None:
+    """Note the images beside a plant that has texture coordinates and no texture to lay on them."""
+    if not plant.uvs.any() or any(m.color_texture is not None for m in plant.materials):
+        return
+    images = sorted(p.name for p in path.parent.iterdir() if p.suffix.lower() in LOOSE_IMAGES)
+    if images:
+        notes.append(
+            f"the file names no texture; {len(images)} images beside it are not used "
+            f"({', '.join(images[:4])}{', ...' if len(images) > 4 else ''})"
+        )
 
 
 def _only_faces(mesh: _Mesh, keep: np.ndarray) -> _Mesh:
