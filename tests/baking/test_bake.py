@@ -299,3 +299,18 @@ def test_inputs_are_left_as_they_were():
     assert (plant.positions == before[0]).all()
     assert (plant.materials[1].color_texture.pixels == before[1]).all()
     assert isinstance(plant, Plant) and not labels.any()
+
+
+def test_sources_much_finer_than_the_samples_keep_their_mean():
+    """A fine cut-out texture, seen 16 texels to a sample, still covers what it covers."""
+    rng = np.random.default_rng(7)
+    image = np.full((512, 512, 4), [90, 140, 60, 255], dtype=np.uint8)
+    image[..., 3] = 255 * (rng.random((512, 512)) < 0.3)
+    leaf = Material("m", color_texture=texture(image), alpha_mode="mask", double_sided=True)
+    plant = quads([[0, 0, 0]], materials=(leaf,))
+    with PlantBuffers(plant) as buffers:
+        assert buffers.texels_per_metre == pytest.approx([256])
+        baked = bake(buffers, ZERO, billboards([[0, 0, 0]], 1.0), 4.0, BakeOptions(supersample=4))
+    color, _, _ = cut(baked.atlas)
+    assert color[..., 3].mean() / 255 == pytest.approx(0.3, abs=0.03)
+    assert np.abs(color[color[..., 3] > 0][:, :3] - [90, 140, 60]).max() <= 1

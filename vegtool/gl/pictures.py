@@ -23,6 +23,9 @@ CLIP_PLANES = (0x3000, 0x3001, 0x3002, 0x3003)
 PICTURES_PER_ROW = 1024
 SAMPLE_LIMIT = 4_000_000
 """Samples drawn at a time, 12 bytes each; larger atlases are drawn band by band."""
+MINIFIED = 4.0
+"""Texels of a source per sample, along each axis, from which samples take one texel instead of
+four: filtering would average a sixteenth of what lies between samples and costs a third more."""
 LEAST_HALF_SIZE = 1e-7
 """Of the plant's radius: keeps the scale of a picture without width finite; it stays empty."""
 
@@ -81,7 +84,8 @@ def draw_pictures(
             for first in range(0, height, rows):
                 band = (first, min(rows, height - first))
                 target.use(band[1] * samples)
-                _draw(buffers, _within(stream, pictures.rect, band), table, size, band)
+                part = _within(stream, pictures.rect, band)
+                _draw(buffers, part, table, size, band, samples * _density(pictures))
                 watch.lap("draw")
                 atlas.resolve(target, samples, band)
                 watch.lap("resolve")
@@ -91,6 +95,13 @@ def draw_pictures(
         for made in (table, target, atlas):
             made.release()
     return Drawn(color, normal, depth, watch.seconds)
+
+
+def _density(pictures: Pictures) -> float:
+    """Texels per metre of the pictures together."""
+    area = float(4 * pictures.half_size.prod(axis=1).sum())
+    texels = float(pictures.rect[:, 2:].astype(np.float64).prod(axis=1).sum())
+    return float(np.sqrt(texels / area)) if area > 0 else np.inf
 
 
 class _Watch:
@@ -142,6 +153,7 @@ def _draw(
     table: moderngl.Texture,
     size: tuple[int, int],
     band: tuple[int, int],
+    samples_per_metre: float,
 ) -> None:
     """Draw a band of the atlas into the framebuffer in use."""
     if not len(stream.face):
@@ -170,7 +182,8 @@ def _draw(
             shader["band"] = band
             shader["vertices"] = 2
             shader["pictures"] = 3
-            buffers.use(group, shader)
+            coarse = buffers.texels_per_metre[group.number] > MINIFIED * samples_per_metre
+            buffers.use(group, shader, point_sampled=bool(coarse))
             buffers.vertex_texture.use(2)
             table.use(3)
             culling = 0 if group.material.double_sided else moderngl.CULL_FACE

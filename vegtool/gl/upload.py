@@ -62,6 +62,10 @@ class PlantBuffers:
         self.origin: FloatArray = plant.center
         self.face_order = np.argsort(plant.face_material, kind="stable").astype(np.int32)
         self._mipmaps = mipmaps
+        self._filter = (
+            moderngl.LINEAR_MIPMAP_LINEAR if mipmaps else moderngl.LINEAR,
+            moderngl.LINEAR,
+        )
         self._textures: dict[tuple[int, bool], moderngl.Texture] = {}
         self._owned: list[moderngl.Buffer | moderngl.Texture | moderngl.VertexArray] = []
         self._arrays: dict[moderngl.Program, moderngl.VertexArray] = {}
@@ -108,6 +112,21 @@ class PlantBuffers:
         texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         return self._own(texture)
 
+    @cached_property
+    def texels_per_metre(self) -> FloatArray:
+        """(m,) per material: density of its colour texture on the surface, the root of the ratio
+        of areas; 0 where there is no texture or no area."""
+        plant = self.plant
+        uv = plant.uvs[plant.faces]
+        (du1, dv1), (du2, dv2) = (uv[:, 1] - uv[:, 0]).T, (uv[:, 2] - uv[:, 0]).T
+        materials = len(plant.materials)
+        mapped = np.bincount(plant.face_material, np.abs(du1 * dv2 - du2 * dv1) / 2, materials)
+        surface = np.bincount(plant.face_material, plant.face_areas, materials)
+        images = [m.color_texture for m in plant.materials]
+        pixels = np.array([0.0 if i is None else np.prod(i.pixels.shape[:2]) for i in images])
+        ratio = np.divide(mapped * pixels, surface, out=np.zeros(materials), where=surface > 0)
+        return np.asarray(np.sqrt(ratio))
+
     def vertex_array(self, program: moderngl.Program) -> moderngl.VertexArray:
         """The plant as input of `program`, which declares in_position_u, in_normal_v, in_color."""
         if program not in self._arrays:
@@ -120,9 +139,17 @@ class PlantBuffers:
             )
         return self._arrays[program]
 
-    def use(self, group: MaterialGroup, program: moderngl.Program) -> None:
-        """Bind a material's textures (units 0 and 1) and set the uniforms of `material.glsl`."""
+    def use(
+        self, group: MaterialGroup, program: moderngl.Program, *, point_sampled: bool = False
+    ) -> None:
+        """Bind a material's textures (units 0 and 1) and set the uniforms of `material.glsl`.
+
+        point_sampled: take the nearest texel of the colour texture, unfiltered.
+        """
         material = group.material
+        group.color_map.filter = (
+            (moderngl.NEAREST, moderngl.NEAREST) if point_sampled else self._filter
+        )
         group.color_map.use(0)
         if group.normal_map is not None:
             group.normal_map.use(1)
@@ -175,10 +202,9 @@ class PlantBuffers:
                 np.ascontiguousarray(pixels),
                 internal_format=SRGB8_ALPHA8 if srgb else None,
             )
-            texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
             if self._mipmaps:
                 texture.build_mipmaps()
-                texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+            texture.filter = self._filter
             self._textures[key] = self._own(texture)
         return self._textures[key]
 
