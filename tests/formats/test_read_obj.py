@@ -211,6 +211,7 @@ def tree_text(names: list[str]) -> str:
     "names",
     [
         ["branch_L0_0", "branch_L1_1", "branch_L1_2", "branch_L2_3"],
+        ["Level 1 0", "Level 2 1", "Level 2 2", "Level 3 3"],
         ["stem", "stem.0", "stem.1", "stem.1.0"],
     ],
 )

@@ -115,7 +115,12 @@ def _parents_by_level(
     vertex_owner[faces.ravel()] = np.repeat(owner, 3)
     vertices = np.flatnonzero(vertex_owner >= 0)
     by_branch = vertices[np.argsort(vertex_owner[vertices], kind="stable")]
-    branches, first = np.unique(vertex_owner[by_branch], return_index=True)
+    branches, first, counts = np.unique(
+        vertex_owner[by_branch], return_index=True, return_counts=True
+    )
+    if (level[branches] < 0).any():
+        return None
+    level = level - level[branches].min()  # some count their trunk as 1
     parent = np.full(len(level), -1, dtype=np.int64)
     for current in range(1, int(level[branches].max(initial=0)) + 1):
         above = vertices[level[vertex_owner[vertices]] == current - 1]
@@ -124,14 +129,15 @@ def _parents_by_level(
             continue
         if not len(above):
             return None
-        base = by_branch[first[here][:, None] + np.arange(BASE_POINTS)]
+        step = np.minimum(np.arange(BASE_POINTS), counts[here][:, None] - 1)
+        base = by_branch[first[here][:, None] + step]
         tree = cKDTree(plant.positions[above])
         count = min(NEIGHBOURS, len(above))
         _, near = tree.query(_circle_centers(plant.positions[base]), k=count)
         voters = vertex_owner[above[near.reshape(len(base), count)]]
         votes = (voters[:, :, None] == voters[:, None, :]).sum(axis=2)
         parent[branches[here]] = voters[np.arange(len(base)), votes.argmax(axis=1)]
-    return None if (level[branches] < 0).any() else parent
+    return parent
 
 
 def _circle_centers(points: FloatArray) -> FloatArray:
