@@ -12,6 +12,8 @@ of least area.
 
 from __future__ import annotations
 
+from itertools import combinations_with_replacement
+
 import numpy as np
 
 from vegtool.arrays import FloatArray, IntArray, unit
@@ -32,57 +34,67 @@ def oriented_planes(corners: FloatArray, cluster: IntArray, count: int) -> Boxes
     if not len(corners):
         return Boxes(center, axes, half)
     groups = Groups(cluster)
-    first = corners[groups.order[groups.starts[:-1]], 0]
-    local = corners[groups.order] - groups.spread(first)[:, None]
-    normal = plane_normals(local, groups)
-    for group, part in enumerate(groups.slices()):
-        k = groups.present[group]
-        points = local[part].reshape(-1, 3)
-        axes[k], center[k], half[k] = box_about(points, normal[group])
-    center[groups.present] += first
+    origin = corners[groups.order[groups.starts[:-1]], 0]
+    local = np.ascontiguousarray(corners[groups.order].transpose(2, 1, 0))  # axis, corner, face
+    for axis, row in enumerate(local):
+        row -= groups.spread(origin[:, axis])
+    frames = frames_about(plane_normals(local, groups))
+    low, high = np.empty((len(groups), 3)), np.empty((len(groups), 3))
+    side = np.empty((len(groups), 2))
+    for i, part in enumerate(groups.slices()):
+        x, y, depth = np.einsum("ij,jn->in", frames[i], local[:, :, part].reshape(3, -1))
+        side[i], low[i, :2], high[i, :2] = least_rectangle(np.stack([x, y]))
+        low[i, 2], high[i, 2] = depth.min(), depth.max()
+    here = groups.present
+    frames = turned(frames, side)
+    center[here] = origin + np.einsum("gi,gij->gj", (low + high) / 2, frames)
+    axes[here], half[here] = longer_first(frames, (high - low) / 2)
     return Boxes(center, axes, half)
 
 
 def plane_normals(local: FloatArray, groups: Groups) -> FloatArray:
-    """Unit normals (g, 3) of the planes, from corners (f, 3, 3) sorted by group."""
-    size = np.sqrt(groups.greatest((local**2).sum(axis=2).max(axis=1)))
-    local = local / groups.spread(np.where(size > 0, size, 1.0))[:, None, None]
-    vector = 0.5 * np.cross(local[:, 1] - local[:, 0], local[:, 2] - local[:, 0])
-    area = np.linalg.norm(vector, axis=1)
-    total = groups.sum(area)
-    weight = np.where(groups.spread(total) > 0, area, 1.0)  # no area at all: every face alike
+    """Unit normals (g, 3) of the planes, from coordinates (axis, corner, face) sorted by group."""
+    size = np.sqrt(groups.greatest((local**2).sum(axis=0).max(axis=0)))
+    local = local * groups.spread(1 / np.where(size > 0, size, 1.0))
+    middle = local.mean(axis=1)
+    vector = 0.5 * np.cross(local[:, 1] - local[:, 0], local[:, 2] - local[:, 0], axis=0)
+    area = np.sqrt((vector**2).sum(axis=0))
+    weight = np.where(groups.spread(groups.sum(area)) > 0, area, 1.0)  # no area: every face alike
     total = groups.sum(weight)
-    centroid = local.mean(axis=1)
-    mean = groups.sum(weight[:, None] * centroid) / total[:, None]
-    offset = local - groups.spread(mean)[:, None]
-    middle = centroid - groups.spread(mean)
-    # A triangle's second moment about a point is area / 12 (sum of v v^T + 9 c c^T).
-    moment = np.einsum("fci,fcj->fij", offset, offset)
-    moment += 9 * middle[:, :, None] * middle[:, None, :]
-    scatter = groups.sum(weight[:, None, None] / 12 * moment)
+    mean = np.stack([groups.sum(weight * row) / total for row in middle])
+    local -= groups.spread(mean.T).T[:, None]
+    middle -= groups.spread(mean.T).T
+    facing = np.divide(vector, area, out=np.zeros_like(vector), where=area > 0)
+    scatter, looks = np.empty((len(groups), 3, 3)), np.empty((len(groups), 3, 3))
+    for i, j in combinations_with_replacement(range(3), 2):
+        # A triangle's second moment about a point is area / 12 (sum of v v^T + 9 c c^T).
+        moment = (local[i] * local[j]).sum(axis=0) + 9 * middle[i] * middle[j]
+        scatter[:, i, j] = scatter[:, j, i] = groups.sum(weight / 12 * moment)
+        looks[:, i, j] = looks[:, j, i] = groups.sum(weight * facing[i] * facing[j]) / total
     trace = np.trace(scatter, axis1=1, axis2=2)
     scatter /= np.where(trace > 0, trace, 1.0)[:, None, None]
-    facing = unit(vector)
-    outer = groups.sum(weight[:, None, None] * facing[:, :, None] * facing[:, None, :])
-    _, vectors = np.linalg.eigh(scatter - outer / total[:, None, None])
+    _, vectors = np.linalg.eigh(scatter - looks)
     return np.asarray(vectors[:, :, 0])
 
 
-def box_about(points: FloatArray, normal: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Axes (3, 3), center (3,) and half extents (3,) of the least box with that third axis."""
-    across = np.eye(3)[np.abs(normal).argmin()]
-    a = np.cross(normal, across)
-    a /= np.linalg.norm(a)
-    b = np.cross(normal, a)
-    flat = np.einsum("ij,nj->ni", np.stack([a, b]), points)
-    direction = least_rectangle(flat)
-    first = direction[0] * a + direction[1] * b
-    axes = np.stack([first, np.cross(normal, first), normal])
-    along = np.einsum("ij,nj->in", axes, points)
-    low, high = along.min(axis=1), along.max(axis=1)
-    half = (high - low) / 2
-    center = (high + low) / 2 @ axes
-    if half[1] > half[0]:
-        axes = np.stack([axes[1], -axes[0], axes[2]])
-        half = half[[1, 0, 2]]
-    return axes, center, half
+def frames_about(normal: FloatArray) -> FloatArray:
+    """Right-handed axes (g, 3, 3) whose third rows are the normals (g, 3)."""
+    across = np.eye(3)[np.abs(normal).argmin(axis=1)]
+    first = unit(np.cross(across, normal))
+    return np.stack([first, np.cross(normal, first), normal], axis=1)
+
+
+def turned(frames: FloatArray, side: FloatArray) -> FloatArray:
+    """Frames (g, 3, 3) turned about their third axes, the first ones to directions (g, 2)."""
+    x, y = side[:, :1], side[:, 1:]
+    first = x * frames[:, 0] + y * frames[:, 1]
+    second = x * frames[:, 1] - y * frames[:, 0]
+    return np.stack([first, second, frames[:, 2]], axis=1)
+
+
+def longer_first(axes: FloatArray, half: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Axes and half extents with the longer of the first two in front, still right-handed."""
+    swap = half[:, 1] > half[:, 0]
+    other = np.stack([axes[:, 1], -axes[:, 0], axes[:, 2]], axis=1)
+    axes = np.where(swap[:, None, None], other, axes)
+    return axes, np.where(swap[:, None], half[:, [1, 0, 2]], half)

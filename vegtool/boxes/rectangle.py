@@ -11,54 +11,53 @@ import numpy as np
 
 from vegtool.arrays import FloatArray
 
-RING = 16
-"""Directions whose extreme points span the polygon that discards inner points."""
+RING = 8
+"""Directions, of half a turn, whose extreme points span the polygon that discards inner points."""
 
 
-def least_rectangle(points: FloatArray) -> FloatArray:
-    """Unit vector (2,) along a side of the rectangle of least area around points (n, 2).
+def least_rectangle(points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The rectangle of least area around points (2, n).
 
-    Points on one line give its direction; equal points give (1, 0).
+    Returns a unit vector (2,) along one of its sides, and its least and greatest coordinate (2,)
+    along that and along the direction a quarter turn on. Points on one line give its direction,
+    equal points (1, 0).
     """
     hull = convex_hull(outer_points(points))
-    edges = np.roll(hull, -1, axis=0) - hull
-    length = np.hypot(edges[:, 0], edges[:, 1])
-    edges, length = edges[length > 0], length[length > 0]
-    if not len(edges):
-        return np.array([1.0, 0.0])
-    edges /= length[:, None]
-    hull = hull - hull[0]
-    along = hull[:, 0] * edges[:, :1] + hull[:, 1] * edges[:, 1:]
-    across = hull[:, 1] * edges[:, :1] - hull[:, 0] * edges[:, 1:]
-    area = np.ptp(along, axis=1) * np.ptp(across, axis=1)
-    return np.asarray(edges[area.argmin()])
+    edge = np.roll(hull, -1, axis=1) - hull
+    length = np.hypot(edge[0], edge[1])
+    if not length.any():
+        return np.array([1.0, 0.0]), hull[:, 0], hull[:, 0]
+    x, y = edge[:, length > 0] / length[length > 0]
+    along = x[:, None] * hull[0] + y[:, None] * hull[1]
+    across = x[:, None] * hull[1] - y[:, None] * hull[0]
+    low = np.stack([along.min(axis=1), across.min(axis=1)])
+    high = np.stack([along.max(axis=1), across.max(axis=1)])
+    best = (high - low).prod(axis=0).argmin()
+    return np.array([x[best], y[best]]), low[:, best], high[:, best]
 
 
 def outer_points(points: FloatArray) -> FloatArray:
-    """The points that are not strictly inside the polygon of a ring of extreme points."""
-    if len(points) <= 2 * RING:
+    """Those of the points (2, n) that are not strictly inside a polygon of extreme ones."""
+    if points.shape[1] <= 2 * RING:
         return points
-    angle = 2 * np.pi * np.arange(RING) / RING
-    ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    polygon = points[np.einsum("rj,nj->rn", ring, points).argmax(axis=1)]
-    edge = np.roll(polygon, -1, axis=0) - polygon
-    side = edge[:, :1] * (points[:, 1] - polygon[:, 1:]) - edge[:, 1:] * (
-        points[:, 0] - polygon[:, :1]
-    )
-    real = np.abs(edge).max(axis=1) > 0
+    turn = np.pi * np.arange(RING) / RING
+    along = np.cos(turn)[:, None] * points[0] + np.sin(turn)[:, None] * points[1]
+    corner = points[:, np.concatenate([along.argmax(axis=1), along.argmin(axis=1)])]
+    edge = np.roll(corner, -1, axis=1) - corner
+    real = edge.any(axis=0)
     if not real.any():
-        return points[:1]  # all are the same point
-    outside = ~(side[real] > 0).all(axis=0)
-    return np.asarray(points[outside])
+        return points[:, :1]  # all are the same point
+    (x, y), (cx, cy) = edge[:, real], corner[:, real]
+    left_of = x[:, None] * points[1] - y[:, None] * points[0] > (x * cy - y * cx)[:, None]
+    return np.asarray(points[:, ~left_of.all(axis=0)])
 
 
 def convex_hull(points: FloatArray) -> FloatArray:
-    """Corners (h, 2) of the convex hull, counter-clockwise (Andrew's monotone chain, 1979)."""
-    ordered = [(float(x), float(y)) for x, y in np.unique(points, axis=0)]
+    """Corners (2, h) of the convex hull, counter-clockwise (Andrew's monotone chain, 1979)."""
+    ordered = sorted(set(zip(*points.tolist(), strict=True)))
     if len(ordered) < 3:
-        return np.array(ordered)
-    lower, upper = half_hull(ordered), half_hull(ordered[::-1])
-    return np.array(lower[:-1] + upper[:-1])
+        return np.array(ordered).T
+    return np.array(half_hull(ordered)[:-1] + half_hull(ordered[::-1])[:-1]).T
 
 
 def half_hull(ordered: list[tuple[float, float]]) -> list[tuple[float, float]]:
