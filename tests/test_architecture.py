@@ -30,6 +30,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "doctor": {"measure"},
     "console": set(),
     "flags": set(),
+    "__main__": {"cli"},
     "cli": {
         "batch", "console", "convert", "doctor", "flags", "formats", "growth", "inspect",
     },

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 LEVEL_RATIO = 3
 """Each level has about a third of the billboards of the one before."""
 
-NEAR_PIXELS = 256
+NEAR_PIXELS = 200
 """Size of the plant on the screen (pixels, its longest side) where the first billboard level takes
 over from the geometry, until measuring states the distance: the atlas is made for it."""
 
