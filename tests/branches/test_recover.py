@@ -248,3 +248,14 @@ def test_real_plants_with_the_hierarchy_hidden(name, wood, leaf, variant):
     is_leaf = case.plant.face_is_leaf
     assert 100 * right[~is_leaf].mean() >= wood
     assert 100 * right[is_leaf].mean() >= leaf
+
+
+@pytest.mark.parametrize("variant", ["indexed", "soup shuffled"])
+@pytest.mark.parametrize("name", [real("eztree_ash_small"), real("eztree_pine_medium")])
+def test_rounded_positions_do_not_matter(name, variant):
+    """Half floats, a tenth of a per cent of the height of the tree: joints still show."""
+    case = eztree_case(MODELS, name)
+    rounded = case.plant.positions.astype(np.float16).astype(np.float64)
+    case = bench.Case(replace(case.plant, positions=rounded), case.truth)
+    case = bench.VARIANTS[variant](case)
+    assert bench.right_faces(recover_branches(case.plant), case.truth).mean() > 0.98

@@ -23,8 +23,7 @@ REACH_FRACTION = 0.02  # of the plant's radius
 THIN = 0.25  # what it counts if the host there is thinner than the branch by all of its radius
 BESIDE = 0.5  # what it counts to start beside the host's own start: within its radius there
 ASIDE = 2.0  # and so many times the gap
-ON_AXIS = 1e-4  # of the host's radius: so near its axis that no chance has put it there, and
-# neither of those two counts
+ON_AXIS = 1e-4  # of the host's radius: nearer to its axis, thinness and company count nothing
 AT_START = 1e-6  # of the plant's radius: no tube grows from the very start of another
 
 
@@ -69,23 +68,20 @@ def _offers(
     allowed = np.where(beside, gap <= 0, along > AT_START)
     allowed &= gap <= np.maximum(REACH * radius, REACH_FRACTION)
     row, column = np.nonzero(allowed)
-    child, host = orphans[row], host[row, column]
     cost = (gap / radius + depth + thin + BESIDE * beside)[row, column]
-    beside = beside[row, column]
+    child, host, beside = orphans[row], host[row, column], beside[row, column]
+    keep = _cheapest_hosts(child, host, cost)
+    return child[keep], host[keep], cost[keep], beside[keep]
 
-    order = np.lexsort((cost, host, child))  # the cheapest of each pair
-    order = order[_firsts(child[order] * len(tubes) + host[order])]
+
+def _cheapest_hosts(child: np.ndarray, host: np.ndarray, cost: FloatArray) -> np.ndarray:
+    """Indices of each child's HOSTS cheapest hosts, each once."""
+    order = np.lexsort((cost, host, child))
+    pair = np.stack([child[order], host[order]], axis=1)
+    order = order[np.append(True, (pair[1:] != pair[:-1]).any(axis=1))[: len(order)]]
     order = order[np.lexsort((host[order], cost[order], child[order]))]
-    first = _firsts(child[order])
-    place = np.arange(len(order))
-    nth = place - np.repeat(place[first], np.diff(np.append(place[first], len(order))))
-    order = order[nth < HOSTS]
-    return child[order], host[order], cost[order], beside[order]
-
-
-def _firsts(labels: np.ndarray) -> np.ndarray:
-    """(n,) bool: where a run of equal labels begins."""
-    return np.append(np.ones(min(len(labels), 1), dtype=bool), labels[1:] != labels[:-1])
+    first = np.searchsorted(child[order], child[order])
+    return np.asarray(order[np.arange(len(order)) - first < HOSTS])
 
 
 def _near_segments(points: FloatArray, axes: Axes) -> np.ndarray:
