@@ -29,6 +29,8 @@ TURNS_PER_STEP = 12
 """Turns taken at most at one angle before going on to the next finer one."""
 SHARP = 0.02
 """Fraction of a box's shortest side that the last, halved step may still change it by."""
+LEAST_GAIN = 1e-9
+"""Fraction of its volume by which a neighbour must be smaller: more than rounding."""
 HALVINGS = 12
 """Times the finest step is halved at most: enough for the flattest box that the floor allows."""
 BATCH = 32
@@ -150,33 +152,52 @@ def search(support: list[FloatArray], steps_deg: tuple[float, ...]) -> FloatArra
     """Rotations (g, 3, 3), rows are axes, of the smallest boxes found around each set of points."""
     width = max(len(s) for s in support)
     points = np.stack([np.concatenate([s, np.repeat(s[:1], width - len(s), 0)]) for s in support])
-    grid = START_GRID
-    volumes = box_sides(np.broadcast_to(grid, (len(points), *grid.shape)), points).prod(axis=2)
-    volumes[:, 0] = -1.0  # the principal axes are always one of the starts
-    best = np.argsort(volumes, axis=1, kind="stable")[:, :STARTS]
-    rotation = grid[best].reshape(-1, 3, 3)
+    rotation = first_rotations(points).reshape(-1, 3, 3)
     points = np.repeat(points, STARTS, axis=0)
     sides = box_sides(rotation[:, None], points)[:, 0]
-    for degrees in (*steps_deg, *(steps_deg[-1] / 2**n for n in range(1, HALVINGS + 1))):
-        active = np.arange(len(points))
-        if degrees < steps_deg[-1]:
-            active = np.flatnonzero(sides.max(1) * np.radians(degrees) > SHARP / 2 * sides.min(1))
-        turns = rotations(NEIGHBOURS * np.radians(degrees))
-        for _ in range(TURNS_PER_STEP):
-            if not len(active):
-                break
-            tried = turns @ rotation[active, None]
-            found = box_sides(tried, points[active])
-            volumes = found.prod(axis=2)
-            best = volumes.argmin(axis=1)
-            row = np.arange(len(active))
-            better = volumes[row, best] < sides[active].prod(axis=1) * (1 - 1e-9)
-            rows = active[better]
-            rotation[rows] = tried[better, best[better]]
-            sides[rows] = found[better, best[better]]
-            active = rows
+    everywhere = np.arange(len(points))
+    for degrees in steps_deg:
+        jitter(rotation, sides, points, degrees, everywhere)
+    for halving in range(1, HALVINGS + 1):
+        degrees = steps_deg[-1] / 2**halving
+        change = sides.max(axis=1) * np.radians(degrees)
+        jitter(rotation, sides, points, degrees, np.flatnonzero(change > SHARP / 2 * sides.min(1)))
     winner = sides.prod(axis=1).reshape(-1, STARTS).argmin(axis=1)
     return np.asarray(rotation.reshape(-1, STARTS, 3, 3)[np.arange(len(winner)), winner])
+
+
+def first_rotations(points: FloatArray) -> FloatArray:
+    """(g, STARTS, 3, 3): none, and those of the grid that give points (g, m, 3) smaller boxes."""
+    grid = np.broadcast_to(START_GRID, (len(points), *START_GRID.shape))
+    volumes = box_sides(grid, points).prod(axis=2)
+    volumes[:, 0] = -1.0  # the principal axes are always one of the starts
+    return START_GRID[np.argsort(volumes, axis=1, kind="stable")[:, :STARTS]]
+
+
+def jitter(
+    rotation: FloatArray,
+    sides: FloatArray,
+    points: FloatArray,
+    degrees: float,
+    active: npt.NDArray[np.intp],
+) -> None:
+    """Turn the active boxes to their smallest neighbours until none is smaller, in place.
+
+    rotation: (g, 3, 3) and sides: (g, 3), both updated; points: (g, m, 3).
+    """
+    turns = rotations(NEIGHBOURS * np.radians(degrees))
+    for _ in range(TURNS_PER_STEP):
+        if not len(active):
+            return
+        tried = turns @ rotation[active, None]
+        found = box_sides(tried, points[active])
+        volumes = found.prod(axis=2)
+        best = volumes.argmin(axis=1)
+        row = np.arange(len(active))
+        better = volumes[row, best] < sides[active].prod(axis=1) * (1 - LEAST_GAIN)
+        active = active[better]
+        rotation[active] = tried[better, best[better]]
+        sides[active] = found[better, best[better]]
 
 
 def box_sides(rotation: FloatArray, points: FloatArray) -> FloatArray:
