@@ -20,6 +20,7 @@ from vegtool.baking.options import BakeOptions
 from vegtool.baking.pack import Packing, pack
 from vegtool.baking.sides import compare_sides, opposite_needed, pictures_of, turned
 from vegtool.errors import UsageError
+from vegtool.gl.context import describe
 from vegtool.gl.pictures import Drawn, draw_pictures
 from vegtool.gl.upload import PlantBuffers as PlantBuffers  # for those who bake several levels
 from vegtool.lod import Atlas, Billboards
@@ -85,7 +86,8 @@ def bake(
     with _timed(seconds, "pack"):
         half_size = np.concatenate([billboards.half_size, billboards.half_size[behind]])
         half_size[len(billboards) :][sides.back[behind] == 0] = 0  # nothing there: one texel
-        packing, density = fit(half_size, texels_per_metre, options)
+        limit = min(options.max_texture, describe(plant.ctx).max_texture)
+        packing, density = fit(half_size, texels_per_metre, options.gutter, limit)
         samples = supersample(packing, options)
 
     which = np.concatenate([np.arange(len(billboards)), behind])
@@ -141,23 +143,23 @@ def _pairs_behind(
 
 
 def fit(
-    half_size: FloatArray, texels_per_metre: float, options: BakeOptions
+    half_size: FloatArray, texels_per_metre: float, gutter: int, max_texture: int
 ) -> tuple[Packing, float]:
     """Pictures in whole texels, packed; the density is lowered until max_texture holds them."""
     density = texels_per_metre
     while True:
         sizes = np.maximum(1, np.rint(2 * density * half_size)).astype(np.int32)
-        area = float(np.prod(sizes.astype(np.float64) + 2 * options.gutter, axis=1).sum())
-        excess = area / options.max_texture**2
-        if excess <= 1 and int(sizes.max()) + 2 * options.gutter <= options.max_texture:
-            packing = pack(sizes, options.gutter, options.max_texture)
-            excess = packing.height / options.max_texture
+        area = float(np.prod(sizes.astype(np.float64) + 2 * gutter, axis=1).sum())
+        excess = area / max_texture**2
+        if excess <= 1 and int(sizes.max()) + 2 * gutter <= max_texture:
+            packing = pack(sizes, gutter, max_texture)
+            excess = packing.height / max_texture
             if excess <= 1:
                 return packing, density
         if sizes.max() == 1:
             raise UsageError(
-                f"{len(half_size)} billboards do not fit into a texture of {options.max_texture} x "
-                f"{options.max_texture} texels, even with one texel each. Ask for fewer "
+                f"{len(half_size)} billboards do not fit into a texture of {max_texture} x "
+                f"{max_texture} texels, even with one texel each. Ask for fewer "
                 f"billboards (--billboards) or allow a larger texture (--max-texture)."
             )
         density *= min(0.95, 1 / sqrt(excess))

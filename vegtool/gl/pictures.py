@@ -8,13 +8,14 @@ all levels, and no state changes between pictures.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 from time import perf_counter
 
 import moderngl
 import numpy as np
 
 from vegtool.arrays import ByteArray, FloatArray, IntArray
-from vegtool.gl.context import framebuffer_kept
+from vegtool.gl.context import describe, framebuffer_kept
 from vegtool.gl.program import program
 from vegtool.gl.upload import PlantBuffers
 
@@ -22,12 +23,15 @@ RGB10_A2 = 0x8059
 CLIP_PLANES = (0x3000, 0x3001, 0x3002, 0x3003)
 PICTURES_PER_ROW = 1024
 SAMPLE_LIMIT = 4_000_000
-"""Samples drawn at a time, 12 bytes each; larger atlases are drawn band by band."""
+"""Samples drawn at a time, 12 bytes each; larger atlases are drawn tile by tile."""
 MINIFIED = 4.0
 """Texels of a source per sample, along each axis, from which samples take one texel instead of
 four: filtering would average a sixteenth of what lies between samples and costs a third more."""
 LEAST_HALF_SIZE = 1e-7
 """Of the plant's radius: keeps the scale of a picture without width finite; it stays empty."""
+
+Tile = tuple[int, int, int, int]
+"""Texels x0, y0, width, height: a part of the atlas that is drawn at a time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,20 +78,21 @@ def draw_pictures(
     width, height = size
     watch = _Watch(ctx)
     stream = _stream(buffers, pictures, face, picture)
-    rows = int(np.clip(SAMPLE_LIMIT // (width * samples * samples), 1, height))
+    columns = min(width, describe(ctx).max_texture // samples)
+    rows = int(np.clip(SAMPLE_LIMIT // (columns * samples * samples), 1, height))
     table = _picture_table(buffers, pictures)
-    target = _Samples(ctx, (width * samples, rows * samples))
+    target = _Samples(ctx, (columns * samples, rows * samples))
     atlas = _Resolved(ctx, size)
     watch.lap("stream")
     try:
         with framebuffer_kept(ctx):
-            for first in range(0, height, rows):
-                band = (first, min(rows, height - first))
-                target.use(band[1] * samples)
-                part = _within(stream, pictures.rect, band)
-                _draw(buffers, part, table, size, band, samples * _density(pictures))
+            for x, y in product(range(0, width, columns), range(0, height, rows)):
+                tile = (x, y, min(columns, width - x), min(rows, height - y))
+                target.use(tile[2] * samples, tile[3] * samples)
+                part = _within(stream, pictures.rect, tile)
+                _draw(buffers, part, table, tile, samples * _density(pictures))
                 watch.lap("draw")
-                atlas.resolve(target, samples, band)
+                atlas.resolve(target, samples, tile)
                 watch.lap("resolve")
             color, normal, depth = atlas.read()
             watch.lap("read")
@@ -137,10 +142,10 @@ def _stream(
     return _Stream(face[order], picture[order], run[order])
 
 
-def _within(stream: _Stream, rect: IntArray, band: tuple[int, int]) -> _Stream:
-    """The part of the stream that reaches into the rows `band` = (first, count) of the atlas."""
-    first, count = band
-    inside = (rect[:, 1] < first + count) & (rect[:, 1] + rect[:, 3] > first)
+def _within(stream: _Stream, rect: IntArray, tile: Tile) -> _Stream:
+    """The part of the stream that reaches into a tile of the atlas."""
+    low, high = np.array(tile[:2]), np.array(tile[:2]) + tile[2:]
+    inside = ((rect[:, :2] < high) & (rect[:, :2] + rect[:, 2:] > low)).all(axis=1)
     if inside.all():
         return stream
     keep = inside[stream.picture]
@@ -151,11 +156,10 @@ def _draw(
     buffers: PlantBuffers,
     stream: _Stream,
     table: moderngl.Texture,
-    size: tuple[int, int],
-    band: tuple[int, int],
+    tile: Tile,
     samples_per_metre: float,
 ) -> None:
-    """Draw a band of the atlas into the framebuffer in use."""
+    """Draw a tile of the atlas into the framebuffer in use."""
     if not len(stream.face):
         return
     ctx, plant = buffers.ctx, buffers.plant
@@ -178,8 +182,7 @@ def _draw(
             mapped = () if group.normal_map is None else ("NORMAL_MAP",)
             shader = program(ctx, "picture.vert", "picture.frag", *colors, *mapped)
             shader["side"] = side
-            shader["atlas_size"] = size
-            shader["band"] = band
+            shader["tile"] = tile
             shader["vertices"] = 2
             shader["pictures"] = 3
             coarse = buffers.texels_per_metre[group.number] > MINIFIED * samples_per_metre
@@ -227,10 +230,10 @@ class _Samples:
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self.framebuffer = ctx.framebuffer([self.color, self.normal], self.depth)
 
-    def use(self, rows: int) -> None:
+    def use(self, width: int, height: int) -> None:
         self.framebuffer.use()
+        self.framebuffer.viewport = (0, 0, width, height)
         self.framebuffer.clear(depth=1.0)
-        self.framebuffer.viewport = (0, 0, self.framebuffer.width, rows)
 
     def release(self) -> None:
         self.framebuffer.release()
@@ -250,17 +253,16 @@ class _Resolved:
         )
         self.framebuffer = ctx.framebuffer(self.textures)
 
-    def resolve(self, target: _Samples, samples: int, band: tuple[int, int]) -> None:
-        """Average the target's samples into the rows `band` = (first, count)."""
-        first, count = band
+    def resolve(self, target: _Samples, samples: int, tile: Tile) -> None:
+        """Average the target's samples into a tile of the atlas."""
         self.framebuffer.use()
-        self.framebuffer.viewport = (0, first, self.framebuffer.width, count)
+        self.framebuffer.viewport = tile
         shader = program(self.ctx, "screen.vert", "picture_resolve.frag")
         for unit, texture in enumerate(target.textures):
             texture.use(unit)
         shader["color_samples"], shader["normal_samples"], shader["depth_samples"] = 0, 1, 2
         shader["samples"] = samples
-        shader["first_row"] = first
+        shader["corner"] = tile[:2]
         self.ctx.enable_only(moderngl.NOTHING)
         array = self.ctx.vertex_array(shader, [])
         array.render(moderngl.TRIANGLES, vertices=3)

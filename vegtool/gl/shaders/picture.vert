@@ -4,8 +4,7 @@
 uniform sampler2D vertices;
 uniform sampler2D pictures;
 uniform float side;  // 1: seen from the front (u x v), -1: from the back
-uniform vec2 atlas_size;
-uniform vec2 band;  // first row and number of rows of the part of the atlas that is drawn
+uniform vec4 tile;  // texels x0, y0, width, height: the part of the atlas that is drawn
 
 in uvec2 in_vertex_picture;
 
@@ -45,7 +44,7 @@ void main() {
 
     // Row 0 of the target is the top row of the atlas, so v runs down.
     vec2 texel = rect.xy + rect.zw * (0.5 + 0.5 * local * vec2(1.0, -1.0));
-    vec2 clip = 2.0 * vec2(texel.x, texel.y - band.x) / vec2(atlas_size.x, band.y) - 1.0;
+    vec2 clip = 2.0 * (texel - tile.xy) / tile.zw - 1.0;
     // Nearest to the viewer wins; a margin keeps the nearest and farthest from being clipped.
     gl_Position = vec4(clip, -0.999 * side * v_depth, 1.0);
     // Nothing may reach the neighbours, whatever the caller's rectangles leave outside.

@@ -6,19 +6,19 @@ uniform sampler2D color_samples;
 uniform sampler2D normal_samples;
 uniform sampler2D depth_samples;
 uniform int samples;
-uniform int first_row;
+uniform ivec2 corner;  // of the tile in the atlas
 
 layout(location = 0) out vec4 out_color;
 layout(location = 1) out vec4 out_normal;
 layout(location = 2) out float out_depth;
 
 void main() {
-    ivec2 corner = (ivec2(gl_FragCoord.xy) - ivec2(0, first_row)) * samples;
+    ivec2 first = (ivec2(gl_FragCoord.xy) - corner) * samples;
     vec3 color = vec3(0.0), normal = vec3(0.0);
     float depth = 0.0, covered = 0.0;
     for (int y = 0; y < samples; ++y) {
         for (int x = 0; x < samples; ++x) {
-            ivec2 at = corner + ivec2(x, y);
+            ivec2 at = first + ivec2(x, y);
             vec4 sampled = texelFetch(color_samples, at, 0);
             if (sampled.a > 0.5) {
                 covered += 1.0;
