@@ -20,7 +20,6 @@ NEIGHBOURS = 24  # samples looked at in each class of thickness
 HOSTS = 8  # of which so many tubes are kept
 REACH = 3.0  # start radii: the widest gap that is bridged, or else
 REACH_FRACTION = 0.02  # of the plant's radius
-THIN = 0.25  # what it counts if the host there is thinner than the branch by all of its radius
 BESIDE = 0.5  # what it counts to start beside the host's own start: within its radius there
 ASIDE = 2.0  # and so many times the gap
 ON_AXIS = 1e-4  # of the host's radius: nearer to its axis, thinness and company count nothing
@@ -63,7 +62,7 @@ def _offers(
     gap = np.maximum(distance - thickness, 0)
     depth = np.minimum(distance / np.maximum(thickness, np.finfo(float).eps), 1)
     off_axis = depth > ON_AXIS
-    thin = THIN * np.maximum(1 - thickness / radius, 0) * off_axis
+    thin = np.maximum(1 - thickness / radius, 0) * off_axis
     beside = (along < thickness + ASIDE * gap) & off_axis
     allowed = np.where(beside, gap <= 0, along > AT_START)
     allowed &= gap <= np.maximum(REACH * radius, REACH_FRACTION)
