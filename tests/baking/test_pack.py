@@ -52,3 +52,18 @@ def test_the_same_sizes_give_the_same_packing_whatever_came_before():
 def test_the_width_keeps_to_the_limit_where_the_rectangles_do():
     packing = pack(np.full((200, 2), 30), 2, 250)
     assert packing.width <= 250
+
+
+@pytest.mark.parametrize(("mip", "most"), [(1, 0.0), (2, 1 / 16)])
+def test_two_texels_of_gutter_keep_neighbours_out_of_two_mips(mip, most):
+    """A client averages 2 x 2 texels a mip and filters bilinearly. Along the edges of a picture,
+    wherever it lies on the mip's grid, the neighbours weigh nothing at mip 1 and at most a
+    sixteenth at mip 2."""
+    gutter, step = 2, 2**mip
+    for offset in range(step):
+        start, end = 64 + offset, 64 + offset + 24
+        neighbours = np.ones(160)
+        neighbours[start - 2 * gutter : end + 2 * gutter] = 0  # theirs begins after both gutters
+        level = neighbours.reshape(-1, step).mean(axis=1)
+        centers = (np.arange(len(level)) + 0.5) * step
+        assert np.interp(np.linspace(start, end, 500), centers, level).max() <= most + 1e-9

@@ -15,6 +15,7 @@ from time import perf_counter
 import numpy as np
 
 from vegtool.arrays import ByteArray, FloatArray, IntArray
+from vegtool.baking.coverage import coverage_kept
 from vegtool.baking.dilate import nearest_covered
 from vegtool.baking.options import BakeOptions
 from vegtool.baking.pack import Packing, pack
@@ -172,9 +173,9 @@ def supersample(packing: Packing, options: BakeOptions) -> int:
 
 
 def dilated(drawn: Drawn, packing: Packing) -> tuple[ByteArray, ByteArray]:
-    """Colour and normals carried under alpha 0; alpha stays as it is."""
+    """Colour and normals carried under alpha 0; alpha such that what is covered passes the test."""
     covered = drawn.color[..., 3] > 0
     nearest = nearest_covered(covered, packing.rect, packing.gutter)
     color = drawn.color.reshape(-1, 4)[nearest]
-    color[..., 3] = drawn.color[..., 3]
+    color[..., 3] = coverage_kept(drawn.color[..., 3], packing.rect)
     return color, drawn.normal.reshape(-1, 3)[nearest]
