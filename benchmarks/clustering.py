@@ -8,7 +8,7 @@ facing  mean |cosine| between face and plane normal (1: every face lies along it
 tilted  RMS of that angle's sine: thick and tilted are the two ways in which a plane is wrong
 long    median ratio of a cluster's first to second principal standard deviation
 fill    projected area of all faces over the rectangles' area (above 1: faces lie over each other)
-seconds median of three
+seconds of the processor, median of three
 `--row` appends the rows to benchmarks/results/clustering.csv.
 """
 
@@ -78,9 +78,9 @@ def rows(
                 options = ClusterOptions(orientation_weight=weight)
                 times = []
                 for _ in range(3):
-                    start = time.perf_counter()
+                    start = time.process_time()
                     labels = cluster(plant, method, count, options)
-                    times.append(time.perf_counter() - start)
+                    times.append(time.process_time() - start)
                 yield {
                     "plant": path.stem,
                     "faces": len(plant.faces),

@@ -94,7 +94,7 @@ def coarse(fine: Samples, count: int, group: Labels | None = None) -> Samples:
         result = coarser(fine, edge, group)
     while len(result.points) > limit and edge < widest:
         edge *= 1.25
-        result = coarser(fine, edge, group)
+        result = coarser(result, edge, group)
     return result if len(result.points) >= count else fine
 
 

@@ -27,13 +27,13 @@ from vegtool.arrays import FloatArray, IntArray
 from vegtool.clustering import ClusterOptions
 from vegtool.clustering.features import Labels, coarse, samples
 from vegtool.clustering.partition import (
+    MANY,
     compacted,
     cut,
     disjoint_pairs,
     fill,
     means,
     pairs_per_round,
-    rounds_for,
     split,
 )
 from vegtool.plant import Plant
@@ -65,15 +65,17 @@ def isodata(
     plant: Plant, count: int, options: ClusterOptions, seed: int, progress: Progress
 ) -> IntArray:
     """(f,) int32 labels of at most `count` long and thin clusters. No random choice is made."""
-    fine = samples(plant, options.orientation_scale(count), count)
+    # lengths along a line shrink, hence positions on the whole: orientation shrinks with them
+    scale = options.orientation_scale(count) / options.elongation ** (1 / 3)
+    fine = samples(plant, scale, count)
     few = coarse(fine, count)
     points, weights = few.points, few.weights
     gain = 1 - 1 / options.elongation**2  # share of the squared distance along a line that is free
     labels = split(points, weights, np.zeros(len(points), dtype=np.int64), count)
-    rounds = rounds_for(count, ROUNDS)
+    rounds = ROUNDS if count <= MANY else 0  # many clusters have few points each
     for remaining in range(rounds, -1, -1):
         labels = move(points, weights, labels, gain)
-        surplus = ceil(EXCHANGE * count * remaining / rounds)
+        surplus = ceil(EXCHANGE * count * remaining / ROUNDS)
         labels = split_wide(points, weights, labels, gain, min(count + surplus, len(points)))
         labels = move(points, weights, labels, gain)
         labels = merge_collinear(points, weights, labels, gain, count)
