@@ -9,6 +9,8 @@ first and none may close a circle. A tube that starts far from all wood is a tru
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from vegtool.arrays import FloatArray
@@ -16,6 +18,9 @@ from vegtool.branches.axes import Axes, tree_of
 from vegtool.branches.skeleton import Skeleton
 from vegtool.branches.tubes import Tubes
 
+Finder = Callable[[FloatArray], np.ndarray]
+
+BLOCK = 4096  # tubes joined at once, which bounds the memory
 NEIGHBOURS = 24  # samples looked at in each class of thickness
 HOSTS = 8  # of which so many tubes are kept
 REACH = 3.0  # start radii: the widest gap that is bridged, or else
@@ -32,7 +37,10 @@ def join_tubes(rings: Skeleton, tubes: Tubes, axes: Axes) -> np.ndarray:
     orphans = np.flatnonzero(tubes.fork < 0)
     if len(orphans) < 2:
         return parent
-    child, host, cost, beside = _offers(rings, tubes, axes, orphans)
+    find = _finder(axes)
+    blocks = [orphans[i : i + BLOCK] for i in range(0, len(orphans), BLOCK)]
+    offers = [_offers(rings, tubes, axes, block, find) for block in blocks]
+    child, host, cost, beside = (np.concatenate(column) for column in zip(*offers, strict=True))
     joined = _cheapest_forest(parent, root_tubes(parent), child, host, cost)
     fellow = np.zeros(len(tubes), dtype=bool)  # stands beside the foot of a trunk
     fellow[child[beside & (joined[child] == host) & (joined[host] < 0)]] = True
@@ -50,13 +58,13 @@ def root_tubes(parent: np.ndarray) -> np.ndarray:
 
 
 def _offers(
-    rings: Skeleton, tubes: Tubes, axes: Axes, orphans: np.ndarray
+    rings: Skeleton, tubes: Tubes, axes: Axes, orphans: np.ndarray, find: Finder
 ) -> tuple[np.ndarray, np.ndarray, FloatArray, np.ndarray]:
     """Possible joins, four arrays (o,): child, host, cost and whether they start side by side; at
     most HOSTS for each child."""
     start = rings.center[tubes.start[orphans]]
     radius = np.maximum(rings.radius[tubes.start[orphans]], np.finfo(float).eps)[:, None]
-    segment = _near_segments(start, axes)
+    segment = find(start)
     distance, thickness, along = axes.measure(start, segment)
     host = axes.tube[segment]
     gap = np.maximum(distance - thickness, 0)
@@ -83,19 +91,23 @@ def _cheapest_hosts(child: np.ndarray, host: np.ndarray, cost: FloatArray) -> np
     return np.asarray(order[np.arange(len(order)) - first < HOSTS])
 
 
-def _near_segments(points: FloatArray, axes: Axes) -> np.ndarray:
-    """(n, k) segments near the points, of every thickness: one search per octave of radius, for
-    a thick tube's axis may lie behind many thin ones."""
+def _finder(axes: Axes) -> Finder:
+    """A function from points (n, 3) to segments near them (n, k), of every thickness: one search
+    per octave of radius, for a thick tube's axis may lie behind many thin ones."""
     samples, segment = axes.samples
     radius = np.maximum(axes.radius_a, axes.radius_b)[segment]
     octave = np.floor(np.log2(np.maximum(radius, 2.0**-20))).astype(np.int64)
-    found = []
-    for value in np.unique(octave):
-        rows = np.flatnonzero(octave == value)
-        k = min(NEIGHBOURS, len(rows))
-        near = tree_of(samples[rows]).query(points, k=k)[1].reshape(len(points), k)
-        found.append(segment[rows[near]])
-    return np.concatenate(found, axis=1)
+    groups = [np.flatnonzero(octave == value) for value in np.unique(octave)]
+    trees = [(tree_of(samples[rows]), segment[rows]) for rows in groups]
+
+    def find(points: FloatArray) -> np.ndarray:
+        found = []
+        for tree, of in trees:
+            k = min(NEIGHBOURS, len(of))
+            found.append(of[tree.query(points, k=k)[1].reshape(len(points), k)])
+        return np.concatenate(found, axis=1)
+
+    return find
 
 
 def _cheapest_forest(
