@@ -81,7 +81,7 @@ class Atlas:
 
     color: (h, w, 4) uint8, sRGB, straight alpha; alpha is coverage; colour dilated under alpha 0.
     normal: (h, w, 3) uint8, tangent space of the billboard (x along u, y along v, blue > 0.5).
-    depth: (h, w) uint16, signed depth along the front normal over the billboard's half_depth:
+    depth: (h, w) uint16, signed depth along the side's own normal over the billboard's half_depth:
     32768 is the plane, 65535 half_depth towards the viewer, 1 half_depth behind, 0 nothing.
     front, back: (p, 4) int32 texels x0, y0, width, height (y down from the top row), gutter not
     included. Both pictures have their left edge at -u and their top edge at +v, so the back's is
