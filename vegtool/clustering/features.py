@@ -93,7 +93,7 @@ def coarse(fine: Samples, count: int, group: Labels | None = None) -> Samples:
         edge /= 2
         result = coarser(fine, edge, group)
     while len(result.points) > limit and edge < widest:
-        edge *= 1.25
+        edge *= max(1.25, (len(result.points) / limit) ** 0.2)  # the points fill some 5 dimensions
         result = coarser(result, edge, group)
     return result if len(result.points) >= count else fine
 
