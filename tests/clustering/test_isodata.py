@@ -17,7 +17,7 @@ def rods(count: int, gap: float) -> np.ndarray:
 
 
 def test_rods_close_together_are_kept_whole() -> None:
-    """Two rods of length 1, 0.25 apart: compact clusters cut across both, long ones take a rod each."""
+    """Rods of length 1, 0.25 apart: compact clusters cut across both, long ones take one each."""
     plant = plant_of(rods(2, 0.25))
     assert cluster(plant, "kmeans", 2).tolist() != [0] * 20 + [1] * 20
     found = cluster(plant, "isodata", 2, ClusterOptions(elongation=4.0))
