@@ -68,10 +68,16 @@ def test_a_branch_that_starts_on_the_bark_hangs_on_the_thick_stem_not_on_a_neare
     assert recover_branches(plant).parent.tolist() == [-1, 0, 0]
 
 
-def test_stems_that_rise_side_by_side_are_trunks_and_branches_far_from_wood_too():
+def test_stems_that_rise_side_by_side_are_trunks():
     stems = [tube((x, 0, 0), (3 * x, 4, 0), (0.1, 0.05)) for x in (-0.15, 0.0, 0.15)]
-    far = tube((3, 2, 0), (4, 2, 0), (0.05, 0.02))
-    assert recover_branches(plant_of([*stems, far], [])).level.tolist() == [0, 0, 0, 0]
+    assert recover_branches(plant_of(stems, [])).level.tolist() == [0, 0, 0]
+
+
+def test_wood_that_touches_nothing_is_a_trunk_if_long_and_else_grows_from_the_nearest():
+    stem = tube((0, 0, 0), (0, 4, 0), (0.1, 0.05))
+    other = tube((3, 0, 0), (3, 4, 0), (0.1, 0.05))
+    twig = tube((2, 3, 0), (1.5, 3, 0), (0.05, 0.02))
+    assert recover_branches(plant_of([stem, other, twig], [])).parent.tolist() == [-1, -1, 1]
 
 
 def test_two_sweeps_that_share_a_ring_are_two_branches():

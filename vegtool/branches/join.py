@@ -4,7 +4,8 @@ Nearest is by the gap between the start of the axis and the other's surface, in 
 another tube, where the gap is nought, by how deep: generators start a branch on its parent's axis.
 Being thicker only weighs in, for generators do make branches thicker than their parents. Two tubes
 that start side by side are rather children of a third, or both trunks. The cheapest joins are made
-first and none may close a circle. A tube that starts far from all wood is a trunk.
+first and none may close a circle. A tube that starts far from all wood is a trunk if it is long,
+and grows from the nearest wood if not.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ REACH_FRACTION = 0.02  # of the plant's radius
 BESIDE = 0.5  # what it counts to start beside the host's own start: within its radius there
 ASIDE = 2.0  # and so many times the gap
 ON_AXIS = 1e-4  # of the host's radius: nearer to its axis, thinness and company count nothing
+LOOSE = 0.25  # of the longest trunk: what is shorter is no trunk, but a branch that touches no wood
 AT_START = 1e-6  # of the plant's radius: no tube grows from the very start of another
 
 
@@ -44,7 +46,22 @@ def join_tubes(rings: Skeleton, tubes: Tubes, axes: Axes) -> np.ndarray:
     joined = _cheapest_forest(parent, root_tubes(parent), child, host, cost)
     fellow = np.zeros(len(tubes), dtype=bool)  # stands beside the foot of a trunk
     fellow[child[beside & (joined[child] == host) & (joined[host] < 0)]] = True
-    return np.where(fellow, -1, joined)
+    return _gather_loose(np.where(fellow, -1, joined), tubes, axes)
+
+
+def _gather_loose(parent: np.ndarray, tubes: Tubes, axes: Axes) -> np.ndarray:
+    """Parents, where trunks that are short for this plant grow from the nearest wood of a tree
+    whose trunk is not."""
+    root = root_tubes(parent)
+    trunk = root == np.arange(len(root))
+    short = trunk & (tubes.length < LOOSE * tubes.length[trunk].max())
+    samples, segment = axes.samples
+    rows = np.flatnonzero(~short[root[axes.tube[segment]]])
+    loose = np.flatnonzero(short)
+    points = axes.b[tubes.start[loose]]
+    gathered = parent.copy()
+    gathered[loose] = axes.tube[segment[rows[tree_of(samples[rows]).query(points)[1]]]]
+    return gathered
 
 
 def root_tubes(parent: np.ndarray) -> np.ndarray:
