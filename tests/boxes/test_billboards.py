@@ -15,10 +15,32 @@ X, Y, Z = np.eye(3)
 
 
 def boxy(half: tuple[float, float, float], turn: FloatArray | None = None) -> Plant:
-    """Small triangles that fill a box."""
+    """Small triangles of all directions that fill a box."""
     points = box_points(half) @ (np.eye(3) if turn is None else turn).T
-    size = 1e-3 * min(half)
-    return plant_of(points[:, None] + size * np.eye(3))
+    corners = np.random.default_rng(1).normal(size=(len(points), 3, 3))
+    return plant_of(points[:, None] + 5e-4 * min(half) * corners)
+
+
+def tube(length: float, radius: float, turn: FloatArray) -> Plant:
+    """The side of an upright cylinder, turned."""
+    angle = np.linspace(0, 2 * np.pi, 25)
+    ring = radius * np.stack([np.cos(angle), 0 * angle, np.sin(angle)], axis=1)
+    low, high = ring - [0, length / 2, 0], ring + [0, length / 2, 0]
+    corners = np.concatenate(
+        [np.stack([low[:-1], low[1:], high[1:]], 1), np.stack([low[:-1], high[1:], high[:-1]], 1)]
+    )
+    return plant_of(corners @ turn.T)
+
+
+@pytest.mark.parametrize("length", [0.7, 2.0, 3.0, 12.0])
+@pytest.mark.parametrize("shape", ["auto", "crossed"])
+def test_a_piece_of_trunk_gets_no_plane_across(length: float, shape) -> None:
+    """Across its axis a tube shows nothing but its rim: two planes along it, however short."""
+    turn = some_rotation()
+    plant = tube(length, 0.5, turn)
+    billboards = make_billboards(plant, labels_of(plant), BoxOptions(shape=shape))
+    assert len(billboards) == 2
+    assert np.abs(billboards.normal @ turn[:, 1]) == pytest.approx(0, abs=0.05)
 
 
 def labels_of(plant: Plant) -> np.ndarray:

@@ -14,6 +14,7 @@ see docs/methods/baking.md.
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from vegtool.arrays import ByteArray, FloatArray, IntArray
 
@@ -29,13 +30,13 @@ def coverage_kept(alpha: ByteArray, rects: IntArray) -> ByteArray:
     """
     result = alpha.copy()
     slices = [np.s_[y : y + h, x : x + w] for x, y, w, h in rects.tolist()]
-    counts = np.stack([np.bincount(alpha[s].ravel(), minlength=256) for s in slices])
+    counts = np.stack([np.bincount(alpha[s].ravel(), minlength=256) for s in slices]).astype(int)
     for where, table in zip(slices, tables(thresholds(counts)), strict=True):
         result[where] = table[alpha[where]]
     return result
 
 
-def thresholds(counts: IntArray) -> IntArray:
+def thresholds(counts: npt.NDArray[np.int64]) -> IntArray:
     """(p,) alpha from which on texels are to pass, of histograms (p, 256).
 
     Of equally good ones the nearest to PASS, so that what passes rightly already stays as it is.

@@ -2,7 +2,9 @@
 
 Paper: Colditz et al. (2005), section 2.1: "A nearly flat box with two long and a small side can be
 represented by a single billboard. If the points form a box with more equal side lengths, three
-crossed billboards are used." A long thin box gets two, crossed along its axis.
+crossed billboards are used." A long thin box gets two, crossed along its axis; so does a compact
+one that a third plane would show from the edge alone, such as a piece of trunk, which would become
+a disc on it.
 """
 
 from __future__ import annotations
@@ -45,9 +47,10 @@ def make_billboards(
     count = int(labels.max()) + 1
     progress("boxes", 0.0)
     boxes = cluster_boxes(plant, labels, count, options)
-    planes = np.where(np.bincount(labels, minlength=count) > 0, planes_per_box(boxes, options), 0)
+    shown = shown_shares(plant, labels, boxes)
+    planes = planes_per_box(boxes, shown, options)
     progress("boxes", 0.9)
-    billboards = cut_planes(plant, labels, boxes, planes)
+    billboards = cut_planes(plant, labels, boxes, planes, shown, options)
     progress("boxes", 1.0)
     return billboards
 
@@ -65,21 +68,44 @@ def planes_per_cluster(
     """(k,) int32: how many billboards each cluster takes, 0 where it has no faces."""
     options = options or BoxOptions()
     count = int(labels.max()) + 1
-    planes = planes_per_box(cluster_boxes(plant, labels, count, options), options)
-    return np.where(np.bincount(labels, minlength=count) > 0, planes, 0).astype(np.int32)
+    boxes = cluster_boxes(plant, labels, count, options)
+    return planes_per_box(boxes, shown_shares(plant, labels, boxes), options)
 
 
-def planes_per_box(boxes: Boxes, options: BoxOptions) -> IntArray:
-    """(k,) int32: 1, 2 or 3 billboards for each box, by its form."""
+def shown_shares(plant: Plant, labels: IntArray, boxes: Boxes) -> FloatArray:
+    """(k, 3): the share of a cluster's area that a plane across each axis of its box shows.
+
+    That is |n . axis|, averaged over the area: a half for faces of all directions, next to nothing
+    for a tube about the axis. -1 for a cluster without faces, a half for one without area.
+    """
+    groups = Groups(labels)
+    axes = boxes.axes[labels[groups.order]]
+    shown = np.abs(np.einsum("fai,fi->fa", axes, plant.face_area_vectors[groups.order]))
+    area = groups.sum(plant.face_areas[groups.order])[:, None]
+    shares = np.full((len(boxes), 3), -1.0)
+    sums = groups.sum(shown)
+    shares[groups.present] = np.divide(sums, area, out=np.full_like(sums, 0.5), where=area > 0)
+    return shares
+
+
+def planes_per_box(boxes: Boxes, shown: FloatArray, options: BoxOptions) -> IntArray:
+    """(k,) int32: 1, 2 or 3 billboards for each box, by its form; 0 for one without faces.
+
+    shown: (k, 3) as from `shown_shares`.
+    """
     longest, middle, least = boxes.half.T
-    if options.shape == "single":
-        return np.ones(len(boxes), dtype=np.int32)
-    long_thin = ratio(middle, longest) < options.long_ratio
-    if options.shape == "crossed":
-        return np.where(long_thin, 2, 3).astype(np.int32)
     flat = ratio(least, middle) < options.flat_ratio
-    compact = 1 if options.plane == "orientation" else 3
-    return np.where(flat, 1, np.where(long_thin, 2, compact)).astype(np.int32)
+    long_thin = ratio(middle, longest) < options.long_ratio
+    compact = np.where(shown.min(axis=1) < options.edge_on, 2, 3)
+    if options.shape == "single":
+        planes = np.ones(len(boxes))
+    elif options.shape == "crossed":
+        planes = np.where(long_thin, 2, compact)
+    elif options.plane == "orientation":
+        planes = np.where(long_thin & ~flat, 2, 1)
+    else:
+        planes = np.where(flat, 1, np.where(long_thin, 2, compact))
+    return np.where(shown[:, 0] < 0, 0, planes).astype(np.int32)
 
 
 def ratio(short: FloatArray, long: FloatArray) -> FloatArray:
@@ -87,17 +113,29 @@ def ratio(short: FloatArray, long: FloatArray) -> FloatArray:
     return np.divide(short, long, out=np.zeros_like(short), where=long > 0)
 
 
-def cut_planes(plant: Plant, labels: IntArray, boxes: Boxes, planes: IntArray) -> Billboards:
+def cut_planes(
+    plant: Plant,
+    labels: IntArray,
+    boxes: Boxes,
+    planes: IntArray,
+    shown: FloatArray,
+    options: BoxOptions,
+) -> Billboards:
     """Billboards through boxes (k), `planes` (k,) 0 to 3 of them each.
 
-    The first has the box's third axis for its normal, the second its second, the third its first:
-    two crossed planes share the longest axis.
+    The first has the box's third axis for its normal, then the second, then the first. Two share
+    the longest axis in a long thin box, else the axis across which a plane shows least; `shown`:
+    (k, 3) as from `shown_shares`.
     """
     cluster = np.repeat(np.arange(len(boxes), dtype=np.int32), planes)
     which = np.concatenate([np.arange(n) for n in planes]).astype(np.int64)
     axes, half = boxes.axes[cluster], boxes.half[cluster]
     row = np.arange(len(cluster))
-    normal_axis, sides = 2 - which, np.array([[0, 1], [0, 2], [1, 2]])[which]
+    long_thin = ratio(boxes.half[:, 1], boxes.half[:, 0]) < options.long_ratio
+    shared = np.where(long_thin | (planes != 2), 0, shown.argmin(axis=1))
+    normals = np.array([[2, 1, 0], [2, 0, 1], [1, 0, 2]])  # by the shared axis, which comes last
+    normal_axis = normals[shared[cluster], which]
+    sides = np.array([[1, 2], [0, 2], [0, 1]])[normal_axis]
 
     normal = axes[row, normal_axis]
     facing, mean = surface_sums(plant, labels, len(boxes))

@@ -12,7 +12,13 @@ from collections.abc import Callable
 import numpy as np
 
 from vegtool.arrays import FloatArray, IntArray
-from vegtool.boxes.billboards import cluster_boxes, cut_planes, planes_per_box, ratio
+from vegtool.boxes.billboards import (
+    cluster_boxes,
+    cut_planes,
+    planes_per_box,
+    ratio,
+    shown_shares,
+)
 from vegtool.boxes.box import Boxes
 from vegtool.boxes.options import BoxOptions, PlaneFit, Shape
 from vegtool.errors import UsageError
@@ -33,6 +39,9 @@ USUAL_PLANES: dict[tuple[Shape, PlaneFit], float] = {
 }
 """Planes per cluster of real trees: where the search for the number of clusters starts."""
 
+Attempt = tuple[IntArray, Boxes, FloatArray, IntArray]
+"""Labels, boxes, shown shares, planes per box."""
+
 
 def fit_budget(
     plant: Plant,
@@ -49,25 +58,32 @@ def fit_budget(
     options = options or BoxOptions()
     if budget < 1:
         raise UsageError(f"expected a budget of at least 1 billboard, got {budget}")
-    tried: dict[int, tuple[IntArray, Boxes, IntArray]] = {}
+    tried: dict[int, Attempt] = {}
     asked = max(round(budget / USUAL_PLANES[options.shape, options.plane]), 1)
     while asked not in tried and len(tried) < MAX_CALLS:
         labels = cluster_fn(asked)
         boxes = cluster_boxes(plant, labels, int(labels.max()) + 1, options)
-        present = np.bincount(labels, minlength=len(boxes)) > 0
-        planes = np.where(present, planes_per_box(boxes, options), 0)
-        tried[asked] = labels, boxes, planes
+        shown = shown_shares(plant, labels, boxes)
+        planes = planes_per_box(boxes, shown, options)
+        tried[asked] = labels, boxes, shown, planes
         total = int(planes.sum())
-        if (1 - SLACK) * budget <= total <= (1 + SLACK) * budget:
+        if affordable(planes, budget, options) and total >= (1 - SLACK) * budget:
             break
-        asked = min(max(round(asked * budget / total), 1), budget)
+        asked = min(max(int(asked * budget / total), 1), budget)
 
-    def preference(attempt: tuple[IntArray, Boxes, IntArray]) -> tuple[bool, int]:
-        total = int(attempt[2].sum())
-        return total <= (1 + SLACK) * budget, -abs(budget - total)
+    def preference(attempt: Attempt) -> tuple[bool, int]:
+        planes = attempt[-1]
+        return affordable(planes, budget, options), -abs(budget - int(planes.sum()))
 
-    labels, boxes, planes = max(tried.values(), key=preference)
-    return labels, cut_planes(plant, labels, boxes, trimmed(boxes, planes, budget, options))
+    labels, boxes, shown, planes = max(tried.values(), key=preference)
+    planes = trimmed(boxes, planes, budget, options)
+    return labels, cut_planes(plant, labels, boxes, planes, shown, options)
+
+
+def affordable(planes: IntArray, budget: int, options: BoxOptions) -> bool:
+    """Whether a little trimming, which leaves crossed shapes crossed, meets the budget."""
+    least = np.minimum(planes, 2 if options.shape == "crossed" else 1).sum()
+    return bool(planes.sum() <= (1 + SLACK) * budget and least <= budget)
 
 
 def trimmed(boxes: Boxes, planes: IntArray, budget: int, options: BoxOptions) -> IntArray:
