@@ -20,11 +20,11 @@ from vegtool.errors import CapabilityError
 
 REQUIRED_VERSION = 330
 LINUX_PACKAGES = (
-    ("apt-get", "sudo apt-get install libegl1 libgl1-mesa-dri"),
-    ("dnf", "sudo dnf install mesa-libEGL mesa-dri-drivers"),
-    ("pacman", "sudo pacman -S mesa"),
-    ("zypper", "sudo zypper install Mesa-libEGL1 Mesa-dri"),
-    ("apk", "sudo apk add mesa-egl mesa-dri-gallium"),
+    ("apt-get", "sudo apt-get install libegl1 libgl1"),
+    ("dnf", "sudo dnf install mesa-libEGL mesa-libGL mesa-dri-drivers"),
+    ("pacman", "sudo pacman -S mesa libglvnd"),
+    ("zypper", "sudo zypper install Mesa-libEGL1 Mesa-libGL1 Mesa-dri"),
+    ("apk", "sudo apk add mesa-egl mesa-gl mesa-dri-gallium"),
 )
 
 
