@@ -25,14 +25,15 @@ def tube(length: float, radius: float, turn: FloatArray) -> Plant:
     """The side of an upright cylinder, turned."""
     angle = np.linspace(0, 2 * np.pi, 25)
     ring = radius * np.stack([np.cos(angle), 0 * angle, np.sin(angle)], axis=1)
-    low, high = ring - [0, length / 2, 0], ring + [0, length / 2, 0]
+    up = np.array([0.0, length / 2, 0.0])
+    low, high = ring - up, ring + up
     corners = np.concatenate(
         [np.stack([low[:-1], low[1:], high[1:]], 1), np.stack([low[:-1], high[1:], high[:-1]], 1)]
     )
     return plant_of(corners @ turn.T)
 
 
-@pytest.mark.parametrize("length", [0.7, 2.0, 3.0, 12.0])
+@pytest.mark.parametrize("length", [0.1, 0.7, 2.0, 3.0, 12.0])
 @pytest.mark.parametrize("shape", ["auto", "crossed"])
 def test_a_piece_of_trunk_gets_no_plane_across(length: float, shape) -> None:
     """Across its axis a tube shows nothing but its rim: two planes along it, however short."""

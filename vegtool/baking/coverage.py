@@ -1,14 +1,12 @@
 """Alpha such that the alpha test shows, of each picture, as much as is covered.
 
-Baked alpha is coverage: a texel half covered by twigs has 0.5, one crossed by a thin one 0.1. Tested
-against a cutoff, everything thinner than half a texel is gone, trunks of far levels first. After
-Castano, "Computing alpha mipmaps" (2010), alpha is raised or lowered until the share of texels that
-pass equals the mean coverage; here for each billboard's picture by itself, since one factor for an
-atlas feeds dense pictures at the cost of thin ones. Ranks are kept, so what grows is what was
-nearly there: the shape of leaves and branches, not slabs.
-
-Measured on an ash and a pine drawn by a stock client, FLIP of levels 1 to 3, without and with:
-see docs/methods/baking.md.
+Baked alpha is coverage: a texel half covered by twigs has 0.5, one crossed by a thin one 0.1.
+Tested against a cutoff, everything thinner than half a texel is gone, trunks of far levels first.
+After Castano, "Computing alpha mipmaps" (2010), alpha is raised or lowered until the share of
+texels that pass equals the mean coverage; here for each billboard's picture by itself, since one
+factor for an atlas feeds dense pictures at the cost of thin ones. Ranks are kept, so what grows is
+what was nearly there: the shape of leaves and branches, not slabs. docs/methods/baking.md says
+what it does to real plants.
 """
 
 from __future__ import annotations

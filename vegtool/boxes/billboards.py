@@ -4,7 +4,7 @@ Paper: Colditz et al. (2005), section 2.1: "A nearly flat box with two long and 
 represented by a single billboard. If the points form a box with more equal side lengths, three
 crossed billboards are used." A long thin box gets two, crossed along its axis; so does a compact
 one that a third plane would show from the edge alone, such as a piece of trunk, which would become
-a disc on it.
+a disc on it; and a flat one that its plane would show so, such as a slice of trunk.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ def planes_per_box(boxes: Boxes, shown: FloatArray, options: BoxOptions) -> IntA
     shown: (k, 3) as from `shown_shares`.
     """
     longest, middle, least = boxes.half.T
-    flat = ratio(least, middle) < options.flat_ratio
+    flat = (ratio(least, middle) < options.flat_ratio) & (shown[:, 2] >= options.edge_on)
     long_thin = ratio(middle, longest) < options.long_ratio
     compact = np.where(shown.min(axis=1) < options.edge_on, 2, 3)
     if options.shape == "single":

@@ -24,9 +24,9 @@ class BoxOptions:
     plane through a box of that form errs by at most an eighth of the picture's shorter side.
     long_ratio: a box is long and thin where its middle extent is below this fraction of its
     longest. A third plane, across the axis, would be seen well from its two ends alone.
-    edge_on: a plane is left out of three crossed ones if it would show less than this share of the
-    cluster's area, |n . axis| on average: faces of all directions show a half, the sides of a
-    tapering or bent tube a tenth or two.
+    edge_on: a plane is not drawn (one of three crossed ones, or that of a flat box) if it would
+    show less than this share of the cluster's area, |n . axis| on average: faces of all directions
+    show a half, the sides of a tapering or bent tube a tenth or two.
     steps_deg: angles, in degrees, of the rotations tried, coarse to fine. The paper turns in steps
     of one degree; the coarse ones leave the local minima in which those stick. The last is halved
     on for boxes that it is too coarse for: one degree makes a box 40 times as long as thick by

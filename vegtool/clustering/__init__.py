@@ -31,14 +31,14 @@ class ClusterOptions:
 
     orientation_weight: length, in plant radii, of one unit of face orientation (Frobenius distance
     of the tensors n n^T; two faces at right angles are sqrt 2 apart) in a clustering of 500. It
-    grows and shrinks with the clusters, as the cube root of 500 / count. 0 is the paper: positions
-    alone.
+    grows and shrinks with the clusters, as the cube root of 500 / count. 0, the default, is the
+    paper: positions alone; docs/methods/kmeans.md has the measurement.
     elongation: how many times as long as wide the clusters of `isodata` shall be; 1 is compact.
     strict_level: `branches` stops at the branching level, as in the paper, and leaves the rest of
     the count unused.
     """
 
-    orientation_weight: float = 0.12
+    orientation_weight: float = 0.0
     elongation: float = 2.0
     strict_level: bool = False
 
@@ -50,7 +50,7 @@ class ClusterOptions:
         if not 0 <= self.orientation_weight <= 1e3:
             raise UsageError(
                 f"orientation weight: expected 0 to 1000 plant radii, got {self.orientation_weight}"
-                "; 0 clusters by position alone, 0.12 is the default"
+                "; 0, the default, clusters by position alone, 0.12 by orientation too"
             )
         if not 1 <= self.elongation <= 1e3:
             raise UsageError(

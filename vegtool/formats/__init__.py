@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vegtool.errors import CapabilityError, InputError, UsageError
+from vegtool.options import option
 
 if TYPE_CHECKING:
     from vegtool.plant import Plant
@@ -53,9 +54,11 @@ class ReadOptions:
     wood; empty for a guess.
     """
 
-    unit: str = "m"
-    up: str = "auto"
-    leaf_materials: tuple[str, ...] = ()
+    unit: str = option("m", "Unit of the file: mm, cm, dm, m, in, ft, or a number of metres.")
+    up: str = option(
+        "auto", "Upward axis of the file; auto: the format's own, or judged.", choices=UP_AXES
+    )
+    leaf_materials: tuple[str, ...] = option((), "A material that is leaves: a name or pattern.")
 
     def __post_init__(self) -> None:
         if self.up not in UP_AXES:

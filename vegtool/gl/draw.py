@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vegtool.arrays import FloatArray
+from vegtool.gl.context import framebuffer_kept
 from vegtool.gl.program import program
 from vegtool.gl.upload import PlantBuffers
 
@@ -51,7 +52,7 @@ def draw(
     color = ctx.texture((width, height), 4, dtype="f2", samples=samples)
     depth = ctx.depth_renderbuffer((width, height), samples=samples)
     frame = ctx.framebuffer([color], depth)
-    try:
+    with framebuffer_kept(ctx):
         frame.use()
         frame.clear()
         ctx.enable(moderngl.DEPTH_TEST)
@@ -69,11 +70,10 @@ def draw(
                 ctx.enable(moderngl.CULL_FACE)
             buffers.vertex_array(shader).render(vertices=3 * group.count, first=3 * group.first)
         ctx.disable(moderngl.CULL_FACE)
-        return _read(ctx, frame, width, height, supersample, samples)
-    finally:
-        frame.release()
-        color.release()
-        depth.release()
+        picture = _read(ctx, frame, width, height, supersample, samples)
+    for owned in (frame, color, depth):
+        owned.release()
+    return picture
 
 
 def _read(
