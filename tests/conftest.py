@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+# scikit-learn's joblib counts processors when it is first used, and warns in containers without any.
+os.environ.setdefault("LOKY_MAX_CPU_COUNT", "1")
 np.seterr(divide="raise", over="raise", invalid="raise")
 
 ROOT = Path(__file__).resolve().parent.parent
