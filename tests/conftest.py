@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-# scikit-learn's joblib counts processors when it is first used, and warns in containers without any.
+# scikit-learn's joblib counts processors when first used, and warns in containers that show none.
 os.environ.setdefault("LOKY_MAX_CPU_COUNT", "1")
 np.seterr(divide="raise", over="raise", invalid="raise")
 
