@@ -12,7 +12,7 @@ import pytest
 
 PACKAGE = Path(__file__).parent.parent / "vegtool"
 
-GROUND = {"errors", "arrays", "options", "progress", "seeding", "plant", "lod", "vegtool"}
+GROUND = {"errors", "arrays", "options", "progress", "seeding", "timing", "plant", "lod", "vegtool"}
 """Contracts that every room may import."""
 
 MAY_IMPORT: dict[str, set[str]] = {

@@ -295,6 +295,8 @@ def test_density_is_lowered_to_fit_the_largest_texture():
     packing, density = fit(np.full((50, 2), 1.0), 20.0, 2, 64)
     assert max(packing.width, packing.height) <= 64
     assert 1 < density < 20
+    wide, _ = fit(np.array([[1021.0, 1.0]]), 1.0, 2, 2046)  # 2046 texels, in blocks of four 2048
+    assert wide.width <= 2046
     with pytest.raises(UsageError, match="max-texture"):
         fit(np.full((200, 2), 1.0), 20.0, 2, 64)
 

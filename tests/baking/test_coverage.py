@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vegtool.baking.coverage import PASS, coverage_kept
+from vegtool.baking.coverage import PASS, coverage_kept, tables
 
 WHOLE = np.array([[0, 0, 8, 8]], np.int32)
 
@@ -37,6 +37,13 @@ def test_each_picture_by_itself_and_nothing_outside() -> None:
     kept = coverage_kept(alpha, np.array([[0, 0, 4, 4], [4, 4, 2, 2]], np.int32))
     np.testing.assert_array_equal(kept[:4], alpha[:4])
     np.testing.assert_array_equal(kept[4:, :4], alpha[4:, :4])
+
+
+def test_full_texels_stay_full_even_where_they_alone_pass() -> None:
+    """At a threshold of 255 nothing below passes, and what is full is not lowered to the limit."""
+    table = tables(np.array([255, 254, 1]))
+    np.testing.assert_array_equal(table[:, [0, 255]], [[0, 255]] * 3)
+    assert table[0, 254] < PASS <= table[1, 254]
 
 
 @given(st.binary(min_size=64, max_size=64))

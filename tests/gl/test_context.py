@@ -30,3 +30,13 @@ def test_without_opengl_the_message_names_what_to_install(monkeypatch, manager, 
         room.context.__wrapped__()
     assert caught.value.exit_code == 5
     assert "libEGL.so not loaded" in str(caught.value)
+
+
+@pytest.mark.gl
+def test_what_opengl_refuses_in_silence_is_an_error():
+    ctx = room.context()
+    room.check(ctx)
+    ctx.texture((room.describe().max_texture + 1, 1), 4).release()
+    with pytest.raises(CapabilityError, match="GL_INVALID_VALUE"):
+        room.check(ctx)
+    room.check(ctx)

@@ -1,12 +1,14 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import moderngl
 import numpy as np
 import pytest
 
-from vegtool.gl.context import framebuffer_kept
+from vegtool.gl import upload
+from vegtool.gl.context import describe, framebuffer_kept
 from vegtool.gl.program import source
 from vegtool.gl.upload import PlantBuffers, bled_under_alpha, vertex_data
 from vegtool.plant import Material, Plant, Texture
@@ -108,6 +110,34 @@ def test_cut_out_leaves_keep_their_colour_to_the_edge():
     shown = pixels[pixels[..., 3] > 0]
     assert len(shown) == pytest.approx(32 * 32, abs=100)
     assert (np.abs(shown - shown[0]) <= 1).all()
+
+
+@pytest.mark.gl
+def test_a_texture_that_is_cut_out_and_opaque_is_bled_for_the_one_alone():
+    image = np.zeros((4, 4, 4), dtype=np.uint8)
+    image[1, 1] = [200, 100, 50, 255]
+    shared = Texture("t", image)
+    leaf = Material("leaf", color_texture=shared, alpha_mode="mask")
+    plant = squares([leaf, Material("paper", color_texture=shared)])
+    with PlantBuffers(plant) as buffers:
+        read = [
+            np.frombuffer(g.color_map.read(), np.uint8).reshape(4, 4, 4) for g in buffers.groups
+        ]
+    assert tuple(read[0][0, 0, :3]) == (200, 100, 50)
+    assert tuple(read[1][0, 0, :3]) == (0, 0, 0)
+
+
+@pytest.mark.gl
+def test_many_vertices_take_wider_rows_rather_than_too_many(monkeypatch):
+    """Of a driver whose textures have four rows at most: 12 vertices, 3 in a row of 9 texels."""
+    plant = squares([Material("a"), Material("b"), Material("c")])
+    monkeypatch.setattr(upload, "VERTICES_PER_ROW", 1)
+    monkeypatch.setattr(upload, "describe", lambda ctx: replace(describe(ctx), max_texture=4))
+    with PlantBuffers(plant) as buffers:
+        texture = buffers.vertex_texture
+        assert texture.size == (9, 4)
+        read = np.frombuffer(texture.read(), np.float32).reshape(12, 12)
+    np.testing.assert_array_equal(read, vertex_data(plant, plant.center))
 
 
 @pytest.mark.gl

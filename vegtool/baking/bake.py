@@ -1,16 +1,15 @@
 """Billboards baked into an atlas: colour with coverage, normals and depth in one pass.
 
 Colditz et al. 2005, section 3 (textures of billboard clouds), with DESIGN section 4: sources are
-supersampled without mips, averages are taken in linear light, alpha is coverage.
+supersampled without mips, averages are taken in linear light, alpha is coverage, fitted last to
+the alpha test (coverage.py).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import sqrt
-from time import perf_counter
 
 import numpy as np
 
@@ -27,6 +26,7 @@ from vegtool.gl.upload import PlantBuffers as PlantBuffers  # for those who bake
 from vegtool.lod import Atlas, Billboards
 from vegtool.plant import Plant
 from vegtool.progress import Progress, silent
+from vegtool.timing import timed
 
 MOST_SAMPLES = 8
 """Samples per axis that small atlases are raised to; alpha then has 64 steps."""
@@ -74,9 +74,9 @@ def bake(
             return bake(buffers, labels, billboards, texels_per_metre, options, progress)
     seconds: dict[str, float] = {}
     progress("bake", 0.0)
-    with _timed(seconds, "pairs"):
+    with timed(seconds, "pairs"):
         face, shown_by = pairs(labels, billboards.cluster)
-    with _timed(seconds, "sides"):
+    with timed(seconds, "sides"):
         sides = compare_sides(plant, billboards, face, shown_by)
         billboards, sides = turned(billboards, sides)
         double_sided = options.sides == "double" or (
@@ -84,7 +84,7 @@ def bake(
         )
         behind = np.flatnonzero(sides.differ & (not double_sided)).astype(np.int32)
     progress("bake", 0.2)
-    with _timed(seconds, "pack"):
+    with timed(seconds, "pack"):
         half_size = np.concatenate([billboards.half_size, billboards.half_size[behind]])
         half_size[len(billboards) :][sides.back[behind] == 0] = 0  # nothing there: one texel
         limit = min(options.max_texture, describe(plant.ctx).max_texture)
@@ -104,20 +104,13 @@ def bake(
     )
     seconds |= drawn.seconds
     progress("bake", 0.8)
-    with _timed(seconds, "dilate"):
+    with timed(seconds, "dilate"):
         front = packing.rect[: len(billboards)]
         back = front.copy()
         back[behind] = packing.rect[len(billboards) :]
         atlas = Atlas(*dilated(drawn, packing), drawn.depth, front, back)
     progress("bake", 1.0)
     return Baked(billboards, atlas, double_sided, density, samples, packing.fill, seconds)
-
-
-@contextmanager
-def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
-    started = perf_counter()
-    yield
-    seconds[stage] = perf_counter() - started
 
 
 def pairs(labels: IntArray, cluster: IntArray) -> tuple[IntArray, IntArray]:
@@ -154,7 +147,7 @@ def fit(
         excess = area / max_texture**2
         if excess <= 1 and int(sizes.max()) + 2 * gutter <= max_texture:
             packing = pack(sizes, gutter, max_texture)
-            excess = packing.height / max_texture
+            excess = max(packing.width, packing.height) / max_texture
             if excess <= 1:
                 return packing, density
         if sizes.max() == 1:

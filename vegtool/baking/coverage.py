@@ -52,5 +52,5 @@ def tables(threshold: IntArray) -> ByteArray:
     old = np.arange(256, dtype=np.float64)
     at: FloatArray = threshold[:, None].astype(np.float64)
     below = np.minimum(np.floor(old * PASS / at), PASS - 1)
-    above = PASS + (old - at) * ((255 - PASS) / np.maximum(255 - at, 1))
+    above = 255 - (255 - old) * ((255 - PASS) / np.maximum(255 - at, 1))
     return np.asarray(np.where(old < at, below, np.round(above)), dtype=np.uint8)

@@ -71,6 +71,19 @@ def framebuffer_kept(ctx: moderngl.Context) -> Iterator[None]:
         before.use()
 
 
+def check(ctx: moderngl.Context) -> None:
+    """Raise CapabilityError where OpenGL refused something since the last check.
+
+    It says nothing by itself and goes on, with a wrong picture.
+    """
+    if (error := ctx.error) != "GL_NO_ERROR":
+        raise CapabilityError(
+            f"OpenGL refused to draw ({error}): the plant or its pictures are larger than "
+            f"{describe(ctx).renderer} can hold. Use a plant of fewer triangles or smaller "
+            "textures, or allow less with --max-texture."
+        )
+
+
 def remedy() -> str:
     """The sentence that says what to install on this machine."""
     if system() == "Linux":

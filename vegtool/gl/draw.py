@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vegtool.arrays import FloatArray
-from vegtool.gl.context import framebuffer_kept
+from vegtool.gl.context import check, framebuffer_kept
 from vegtool.gl.program import program
 from vegtool.gl.upload import PlantBuffers
 
@@ -40,7 +40,8 @@ def draw(
 
     view_projection: (4, 4), for positions relative to `target`, (3,) metres. size: width, height
     in pixels. supersample: pictures drawn that much larger per axis and averaged. samples: of
-    multisampling, 0 for none; alpha is tested once per pixel then, as in a client.
+    multisampling, 0 for none; alpha is tested once per pixel then, as in a client. Raises
+    CapabilityError where OpenGL cannot hold the plant or the picture.
     """
     ctx, light = buffers.ctx, light or Light()
     width, height = size[0] * supersample, size[1] * supersample
@@ -71,6 +72,7 @@ def draw(
             buffers.vertex_array(shader).render(vertices=3 * group.count, first=3 * group.first)
         ctx.disable(moderngl.CULL_FACE)
         picture = _read(ctx, frame, width, height, supersample, samples)
+        check(ctx)
     for owned in (frame, color, depth):
         owned.release()
     return picture

@@ -15,7 +15,7 @@ import moderngl
 import numpy as np
 
 from vegtool.arrays import ByteArray, FloatArray, IntArray
-from vegtool.gl.context import describe, framebuffer_kept
+from vegtool.gl.context import check, describe, framebuffer_kept
 from vegtool.gl.program import program
 from vegtool.gl.upload import PlantBuffers
 
@@ -73,6 +73,7 @@ def draw_pictures(
     """Draw `face[i]` of the plant into picture `picture[i]`, for all i; (m,) int32 each.
 
     size: width and height of the atlas in texels. samples: per axis and texel.
+    Raises CapabilityError where OpenGL cannot hold the plant or the pictures.
     """
     ctx = buffers.ctx
     width, height = size
@@ -96,6 +97,7 @@ def draw_pictures(
                 watch.lap("resolve")
             color, normal, depth = atlas.read()
             watch.lap("read")
+            check(ctx)
     finally:
         for made in (table, target, atlas):
             made.release()

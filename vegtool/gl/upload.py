@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vegtool.arrays import ByteArray, FloatArray
-from vegtool.gl.context import context
+from vegtool.gl.context import context, describe
 from vegtool.plant import Material, Plant, Texture
 
 Owned = TypeVar("Owned", moderngl.Buffer, moderngl.Texture, moderngl.VertexArray)
@@ -25,8 +25,8 @@ Owned = TypeVar("Owned", moderngl.Buffer, moderngl.Texture, moderngl.VertexArray
 SRGB8_ALPHA8 = 0x8C43
 VERTEX_FLOATS = 12
 """Per vertex: position, u, normal, v, colour (4); three vec4, as attributes or as texels."""
-DATA_TEXTURE_WIDTH = 3 * 1024
-"""Texels in a row of the vertex data texture: 1,024 vertices; below every GL 3.3 limit."""
+VERTICES_PER_ROW = 1024
+"""Of the vertex data texture, or as many more as keep its height below the driver's limit."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class PlantBuffers:
             moderngl.LINEAR_MIPMAP_LINEAR if mipmaps else moderngl.LINEAR,
             moderngl.LINEAR,
         )
-        self._textures: dict[tuple[int, bool], moderngl.Texture] = {}
+        self._textures: dict[tuple[int, bool, bool], moderngl.Texture] = {}
         self._owned: list[moderngl.Buffer | moderngl.Texture | moderngl.VertexArray] = []
         self._arrays: dict[moderngl.Program, moderngl.VertexArray] = {}
         self.groups = self._material_groups()
@@ -103,12 +103,14 @@ class PlantBuffers:
 
     @cached_property
     def vertex_texture(self) -> moderngl.Texture:
-        """The same three vec4 per vertex as RGBA32F texels, 1,024 vertices to a row."""
+        """The same three vec4 per vertex as RGBA32F texels, whole vertices to a row."""
         data = vertex_data(self.plant, self.origin)
-        rows = max(1, -(-data.size // (4 * DATA_TEXTURE_WIDTH)))
-        texels = np.zeros((rows, DATA_TEXTURE_WIDTH, 4), dtype=np.float32)
+        limit = describe(self.ctx).max_texture
+        width = 3 * max(VERTICES_PER_ROW, -(-len(data) // limit))
+        rows = max(1, -(-data.size // (4 * width)))
+        texels = np.zeros((rows, width, 4), dtype=np.float32)
         texels.reshape(-1)[: data.size] = data.reshape(-1)
-        texture = self.ctx.texture((DATA_TEXTURE_WIDTH, rows), 4, texels.tobytes(), dtype="f4")
+        texture = self.ctx.texture((width, rows), 4, texels, dtype="f4")
         texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         return self._own(texture)
 
@@ -186,13 +188,13 @@ class PlantBuffers:
         )
 
     def _texture(self, image: Texture | None, srgb: bool, cut_out: bool) -> moderngl.Texture:
-        key = (id(image), srgb)
+        key = (id(image), srgb, cut_out)
         if key not in self._textures:
             pixels = np.full((1, 1, 4), 255, np.uint8) if image is None else image.pixels
             if cut_out and not self._mipmaps:
                 pixels = bled_under_alpha(pixels)
             height, width = pixels.shape[:2]
-            limit = int(self.ctx.info["GL_MAX_TEXTURE_SIZE"])
+            limit = describe(self.ctx).max_texture
             while max(height, width) > limit:  # keep every second texel: rare, and never an error
                 pixels = np.ascontiguousarray(pixels[::2, ::2])
                 height, width = pixels.shape[:2]
