@@ -83,7 +83,7 @@ def convert_command(
 
         vegtool convert oak.glb -o out/
 
-        vegtool convert models/ -o out/ -j 4 --method branches --billboards 256
+        vegtool convert models/ -o out/ -j 4 --method kmeans --billboards 256
     """
     from vegtool.batch import Task, convert_files, find_jobs
 

@@ -43,7 +43,7 @@ class ConvertOptions:
     """What shapes a chain of levels. The command line makes its flags from these fields."""
 
     method: str = option(
-        "kmeans", "How faces are grouped into clusters.", choices=tuple(METHODS), short="m"
+        "branches", "How faces are grouped into clusters.", choices=tuple(METHODS), short="m"
     )
     billboards: int = option(
         512,

@@ -7,7 +7,9 @@ above it its own faces (`covered_level`).
 
 That is `strict_level`, and it leaves the rest of the count unused. Otherwise the level is one that
 is covered with PER_BRANCH clusters for each branch, and k-means cuts the branches with the largest
-error until the count is reached, never joining parts of two of them.
+error until the count is reached, never joining parts of two of them. Where no branching level is
+covered, the trunks' own wood still has clusters of its own: mixed with what grows around it, it
+would be drawn on planes that stand across it, in pieces.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ from vegtool.clustering.partition import compacted, merge
 from vegtool.plant import Branches, Plant
 from vegtool.progress import Progress
 
-PER_BRANCH = 8  # clusters per branch, on average: the leaves of one branch face many ways
+PER_BRANCH = 2  # clusters per branch, on average
 
 
 def branches(
@@ -33,8 +35,13 @@ def branches(
 
     known = plant.branches or branches_of(plant)
     each = 1 if options.strict_level else PER_BRANCH
-    owner = known.ancestor_at(covered_level(known, count // each))
-    group = compacted(owner[known.face_branch].astype(np.int64))
+    level = covered_level(known, count // each)
+    owner = known.ancestor_at(level)[known.face_branch].astype(np.int64)
+    if level == 0 and not options.strict_level:
+        own_wood = (known.level[known.face_branch] == 0) & ~plant.face_is_leaf
+        apart = 2 * owner + own_wood
+        owner = apart if len(np.unique(apart)) <= count // each else owner
+    group = compacted(owner)
     covered = int(group.max()) + 1
     if covered == count or (covered < count and options.strict_level):
         return group.astype(np.int32)
