@@ -12,7 +12,10 @@ import pytest
 
 PACKAGE = Path(__file__).parent.parent / "vegtool"
 
-GROUND = {"errors", "arrays", "options", "progress", "seeding", "timing", "plant", "lod", "vegtool"}
+GROUND = {
+    "errors", "arrays", "options", "progress", "seeding", "srgb", "timing",
+    "plant", "lod", "vegtool",
+}  # fmt: skip
 """Contracts that every room may import."""
 
 MAY_IMPORT: dict[str, set[str]] = {

@@ -115,9 +115,14 @@ def test_vertex_colours_are_normalised_shorts():
     assert "COLOR_0" not in parse(plant_glb(leafy_plant())).primitive()
 
 
-def test_a_plant_without_texture_coordinates_stores_none():
+def test_texture_coordinates_are_stored_where_there_are_any_or_a_texture_asks_for_them():
+    """A texture without coordinates would be an invalid file: all zero, as they were read, then."""
     plant = leafy_plant(uvs=np.zeros((8, 2)))
-    assert "TEXCOORD_0" not in parse(plant_glb(plant)).primitive(0, 1)
+    assert not parse(plant_glb(plant)).primitive(0, 1)["TEXCOORD_0"].any()
+    plain = tuple(replace(m, color_texture=None, normal_texture=None) for m in plant.materials)
+    assert "TEXCOORD_0" not in parse(plant_glb(replace(plant, materials=plain))).primitive(0, 1)
+    mapped = replace(leafy_plant(), materials=plain)
+    assert "TEXCOORD_0" in parse(plant_glb(mapped)).primitive(0, 1)
 
 
 def test_branches_are_written_for_each_vertex_and_split_where_they_meet():

@@ -25,7 +25,7 @@ from vegtool.formats.tangents import tangents
 from vegtool.lod import Level, LodChain, billboard_quads
 from vegtool.plant import Branches, Material, Plant, Texture
 
-ALPHA_CUTOFF = 0.5  # of a billboard: alpha is coverage, half covered is drawn
+ALPHA_CUTOFF = 0.5  # of a billboard: what baking/coverage.py fits its alpha to
 ROUGHNESS = 0.9  # of a billboard: foliage seen from afar has no highlight of its own
 FAR_FROM_ORIGIN = 16.0  # plant radii: float32 rounds by 2^-24 of it, a millionth of a radius
 
@@ -214,7 +214,8 @@ class _Writer:
         }
         if frames is not None:
             attributes["TANGENT"] = self._add_floats(frames)
-        if plant.uvs.any():
+        textured = material.color_texture is not None or material.normal_texture is not None
+        if textured or plant.uvs.any():
             attributes["TEXCOORD_0"] = self._add_floats(plant.uvs[vertices])
         if plant.colors is not None:
             share = np.clip(plant.colors[vertices], 0.0, 1.0)

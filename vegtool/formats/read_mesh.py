@@ -19,9 +19,9 @@ from vegtool.formats.alpha import settle_alpha
 from vegtool.formats.beside import find_beside
 from vegtool.formats.images import decode
 from vegtool.formats.parts import Parsed, Part
-from vegtool.formats.read_mtl import srgb_to_linear
 from vegtool.formats.vertex_colors import settle_colors
 from vegtool.plant import Material, Texture
+from vegtool.srgb import linear_from_srgb
 
 PLAIN = Material("default", double_sided=True)
 HEADER = 65_536
@@ -139,4 +139,4 @@ def _linear(colors: np.ndarray) -> FloatArray:
     values = np.asarray(colors, dtype=np.float64)
     if colors.dtype.kind in "iu":
         values = values / 255
-    return np.concatenate([srgb_to_linear(values[:, :3]), values[:, 3:]], axis=1)
+    return np.concatenate([linear_from_srgb(values[:, :3]), values[:, 3:]], axis=1)

@@ -17,6 +17,7 @@ from vegtool.formats.alpha import settle_alpha
 from vegtool.formats.beside import find_beside
 from vegtool.formats.images import decode
 from vegtool.plant import Material, Texture
+from vegtool.srgb import linear_from_srgb
 
 OPTION_VALUES = {
     "-blendu": 1,
@@ -103,7 +104,7 @@ def _material(
         notes.append(f"material {name}: Kd 0 0 0 with a texture would be black; read as white")
         color = np.ones(3)
     if not linear:
-        color = srgb_to_linear(color)
+        color = linear_from_srgb(color)
     base_color = np.append(color, _opacity(name, entries, notes))
     alpha_map = _map(entries.get("map_d"))
     if alpha_map is not None:
@@ -249,9 +250,3 @@ def _numbers(text: str | None, default: list[float]) -> list[float]:
     if len(values) == 1 and len(default) == 3:
         values = values * 3  # one number for all channels
     return values[: len(default)] if len(values) >= len(default) else default
-
-
-def srgb_to_linear(color: FloatArray) -> FloatArray:
-    """IEC 61966-2-1 decoding of values in 0..1."""
-    color = np.clip(color, 0.0, 1.0)
-    return np.where(color <= 0.04045, color / 12.92, ((color + 0.055) / 1.055) ** 2.4)

@@ -17,9 +17,10 @@ from vegtool.errors import InputError
 from vegtool.formats.beside import find_beside
 from vegtool.formats.parts import Declared, IndexArray, Parsed, Part
 from vegtool.formats.polygons import triangulate
-from vegtool.formats.read_mtl import ObjMaterial, read_mtl, srgb_to_linear
+from vegtool.formats.read_mtl import ObjMaterial, read_mtl
 from vegtool.formats.vertex_colors import settle_colors
 from vegtool.plant import Material
+from vegtool.srgb import linear_from_srgb
 
 BRANCH_NAME = re.compile(r"(?:^|[_\-. ])L(?:evel|vl)?[_\-. ]?(\d+)[_\-. ](\d+)$", re.IGNORECASE)
 """One group per branch: level and number, `branch_L2_17`."""
@@ -134,7 +135,7 @@ def _points(path: Path, lines: list[str]) -> tuple[FloatArray, FloatArray | None
     if table.shape[1] < 6:
         return table[:, :3], None
     colors = np.nan_to_num(table[:, 3:6], nan=1.0, posinf=1.0, neginf=0.0)
-    return table[:, :3], srgb_to_linear(colors / 255 if colors.max() > 1 else colors)
+    return table[:, :3], linear_from_srgb(colors / 255 if colors.max() > 1 else colors)
 
 
 def _table(path: Path, kind: str, lines: list[str], least: int, most: int = 0) -> FloatArray:

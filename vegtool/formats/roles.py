@@ -15,6 +15,7 @@ import numpy as np
 from vegtool.arrays import FloatArray
 from vegtool.errors import UsageError
 from vegtool.plant import Material, Role
+from vegtool.srgb import linear_from_srgb
 
 LEAF_WORDS = re.compile(
     r"lea[fv](?!less)|foliage|needle|frond|petal|flower|blossom|canopy|grass|fern|"
@@ -79,5 +80,5 @@ def mean_color(material: Material) -> FloatArray:
         texels = material.color_texture.pixels[::step, ::step].reshape(-1, 4)
         visible = texels[texels[:, 3] >= 128]
         if len(visible):
-            color = ((visible[:, :3] / 255.0) ** 2.2).mean(axis=0)
+            color = linear_from_srgb(visible[:, :3] / 255.0).mean(axis=0)
     return np.asarray(color * material.base_color[:3])

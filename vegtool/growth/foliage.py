@@ -77,7 +77,7 @@ def foliage(
     return Piece(
         positions.reshape(-1, 3),
         np.repeat(normals.reshape(-1, 3), 2, axis=0),
-        _cells(count, rows, kind.pointed, rng),
+        _cells(count, rows, rng),
         pile(faces, 2 * rows, count),
         np.repeat(branch[stem], len(faces)).astype(np.int32),
         np.full(count * len(faces), material, np.int32),
@@ -103,7 +103,7 @@ def _bend(
     return points, tangents
 
 
-def _cells(count: int, rows: int, pointed: bool, rng: np.random.Generator) -> FloatArray:
+def _cells(count: int, rows: int, rng: np.random.Generator) -> FloatArray:
     """(count * rows * 2, 2) UVs: a random one of the texture's drawings, root at its foot."""
     cell = rng.integers(0, CELLS * CELLS, count)
     corner = np.stack([cell % CELLS, cell // CELLS], axis=1)[:, None, None]

@@ -12,6 +12,7 @@ from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Level, billboard_quads
 from vegtool.measure.views import Camera
 from vegtool.plant import Material, Plant, Texture
+from vegtool.srgb import srgb_from_linear
 
 TRUTH_SUPERSAMPLE = 4
 """Per axis, for pictures that are looked at; scores ask for more."""
@@ -72,11 +73,4 @@ def live(
 def over(picture: npt.NDArray[np.float32], background: npt.ArrayLike) -> ByteArray:
     """A linear premultiplied picture (h, w, 4) over a linear colour (3,): sRGB bytes (h, w, 3)."""
     linear = picture[..., :3] + (1 - picture[..., 3:]) * np.asarray(background, np.float32)
-    return np.asarray((srgb(np.clip(linear, 0, 1)) * 255 + 0.5).astype(np.uint8))
-
-
-def srgb(linear: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
-    """Linear light to sRGB, both 0 to 1 (IEC 61966-2-1)."""
-    low = linear * 12.92
-    high = 1.055 * np.maximum(linear, 1e-8) ** (1 / 2.4) - 0.055
-    return np.where(linear <= 0.0031308, low, high)
+    return np.asarray((srgb_from_linear(np.clip(linear, 0, 1)) * 255 + 0.5).astype(np.uint8))
