@@ -19,6 +19,8 @@ from vegtool.errors import UsageError
 from vegtool.plant import Plant
 
 ALL = pytest.mark.parametrize("method", METHODS)
+BOTH = ClusterOptions(orientation_weight=0.12)
+"""By position and orientation."""
 TRIANGLE = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
 
 
@@ -117,7 +119,7 @@ def test_many_points_in_few_places(method: str) -> None:
 def test_scale_changes_nothing(method: str, scale: float) -> None:
     plant = forked(cards(150), 9)
     grown = forked(scale * plant.corners, 9)
-    a, b = (inertia(p, cluster(p, method, 12), 0.12, 12) for p in (plant, grown))
+    a, b = (inertia(p, cluster(p, method, 12, BOTH), 0.12, 12) for p in (plant, grown))
     assert b == pytest.approx(a, rel=0.02)
 
 
@@ -125,7 +127,7 @@ def test_scale_changes_nothing(method: str, scale: float) -> None:
 def test_map_coordinates_change_nothing(method: str) -> None:
     plant = forked(cards(150), 9)
     moved = forked(plant.corners + np.array([5e6, 300.0, -5e6]), 9)
-    a, b = (inertia(p, cluster(p, method, 12), 0.12, 12) for p in (plant, moved))
+    a, b = (inertia(p, cluster(p, method, 12, BOTH), 0.12, 12) for p in (plant, moved))
     assert b == pytest.approx(a, rel=0.02)
 
 
@@ -135,7 +137,7 @@ def test_turning_changes_the_objective_little(method: str) -> None:
     plant = forked(cards(400), 9)
     turn = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
     turned = forked(plant.corners @ turn.T, 9)
-    labels = [cluster(p, method, 25) for p in (plant, turned)]
+    labels = [cluster(p, method, 25, BOTH) for p in (plant, turned)]
     a, b = (inertia(plant, found, 0.12, 25) for found in labels)
     assert b == pytest.approx(a, rel=0.08)
 

@@ -34,7 +34,7 @@ def test_error_is_no_worse_than_scikit_learns(count: int, weight: float) -> None
 def test_error_is_no_worse_through_the_grid() -> None:
     """40,000 cards are more points than it works on at once."""
     plant = plant_of(cards(40_000, size=0.02))
-    ours = cluster(plant, "kmeans", 20)
+    ours = cluster(plant, "kmeans", 20, ClusterOptions(0.12))
     theirs = inertia(plant, reference(plant, 0.12, 20), 0.12, 20)
     assert inertia(plant, ours, 0.12, 20) <= 1.03 * theirs
 
