@@ -289,7 +289,7 @@ def test_far_from_the_origin_nothing_is_lost(tmp_path: Path) -> None:
     made = Gltf()
     made.node(mesh=made.mesh(small), translation=[5e6, 12.0, -5e6])
     plant = read_plant(made.write(tmp_path / "far.glb"))
-    assert plant.notes == ("computed the normals of 4 of 4 vertices",)
+    assert not any("rounds them" in note for note in plant.notes)
     assert np.allclose(plant.positions - [5e6, 12, -5e6], small, atol=2e-9)
     assert np.allclose(plant.normals, [0, 0, 1])
     coarse = quad(tmp_path, positions=(QUAD * 10 + [5e6, 0, 0]).astype(np.float32))

@@ -232,3 +232,10 @@ def test_dome_normals_are_kept(models: Path) -> None:
     plant = model(models, "q_mega_commontree_1/gltf/CommonTree_1.gltf")
     facing = np.einsum("fj,fj->f", plant.face_area_vectors, plant.normals[plant.faces].sum(axis=1))
     assert (facing[plant.face_is_leaf] < 0).mean() > 0.1
+
+
+def test_a_size_that_no_plant_has_is_questioned(models: Path) -> None:
+    """The file counts in centimetres: 49 metres read as 4,900."""
+    path = models / "eztree_ash_zup_cm_obj" / "eztree_ash_zup_cm_obj.obj"
+    assert any("--unit" in note for note in read_plant(path).notes)
+    assert not any("--unit" in note for note in read_plant(path, ReadOptions(unit="cm")).notes)

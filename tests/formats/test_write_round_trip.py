@@ -71,3 +71,15 @@ def test_the_branches_of_a_sample_survive(tmp_path: Path):
     assert np.array_equal(theirs.level[theirs.face_branch], mine.level[mine.face_branch[order]])
     pairs = np.unique(np.stack([mine.face_branch[order], theirs.face_branch], 1), axis=0)
     assert len(pairs) == len(np.unique(pairs[:, 0])) == len(np.unique(pairs[:, 1]))  # one to one
+
+
+def test_branches_that_are_all_trunks_survive(tmp_path: Path) -> None:
+    """A clump of grass: no blade hangs on another, and the file says so."""
+    grass = sample("grass-clump", 400)
+    path = tmp_path / "grass.glb"
+    path.write_bytes(plant_glb(grass))
+    again = read_plant(path).branches
+    assert grass.branches is not None
+    assert again is not None
+    assert len(again) == len(grass.branches)
+    np.testing.assert_array_equal(again.face_branch, grass.branches.face_branch)

@@ -51,7 +51,9 @@ def resolve_branches(
             "the file names its branches; their parents were found by what surrounds their base"
         )
     face_branch, parent = _without_woodless(face_branch, parent, wood)
-    if len(parent) < FEWEST or np.bincount(parent[parent >= 0], minlength=1).max() < 2:
+    stated = declared.source == "attribute" and declared.parent is not None
+    few = len(parent) < FEWEST or np.bincount(parent[parent >= 0], minlength=1).max() < 2
+    if few and not stated:
         return None  # one part per level, or trunk and crown: not one part per branch
     level = _levels(parent)
     if level is None:

@@ -35,6 +35,9 @@ LOOSE_IMAGES = {".png", ".jpg", ".jpeg", ".webp", ".tga"}
 WIDEST_UV = 1e9
 """Texture coordinates beyond are as broken as infinite ones."""
 
+LEAST_SIZE, GREATEST_SIZE = 0.005, 150.0
+"""Metres: no plant that is drawn one by one is smaller or larger; the unit is wrong, rather."""
+
 
 @dataclass(frozen=True, eq=False)
 class _Mesh:
@@ -77,8 +80,15 @@ def assemble(parsed: Parsed, path: Path, options: ReadOptions) -> Plant:
         source=str(path),
     )
     _note_loose_images(plant, path, notes)
+    _note_size(plant, notes)
     branches = resolve_branches(plant, mesh.branch, parsed.declared, notes)
     return replace(plant, branches=branches, notes=tuple(notes))
+
+
+def _note_size(plant: Plant, notes: list[str]) -> None:
+    size = float(np.ptp(plant.bounds, axis=0).max())
+    if not LEAST_SIZE <= size <= GREATEST_SIZE:
+        notes.append(f"{size:,.4g} metres across: is that so? --unit says what the file counts in")
 
 
 def _join(parts: list[Part], path: Path) -> _Mesh:
