@@ -66,8 +66,8 @@ def eztree_case(folder: Path, name: str) -> Case:
     path = next(p for p in (folder / name / f"{name}{e}" for e in (".glb", ".obj")) if p.exists())
     plant = read_plant(path)
     if plant.branches is not None and plant.branches.source == "nodes":
-        return Case(plant.with_branches(None), plant.branches)  # one node per branch: the truth
-    plant = plant.with_branches(None)
+        return Case(replace(plant, branches=None), plant.branches)  # one node per branch: the truth
+    plant = replace(plant, branches=None)
     with np.load(folder / name / f"{name}.face_branch.npz") as table:
         wood, leaf = table["wood_face_branch"], table["leaf_face_branch"]
         parent, level = table["parent"], table["level"]
@@ -97,7 +97,7 @@ def sample_case(name: str) -> Case:
     """A sample plant, and what its generator says."""
     plant = sample(name)
     assert plant.branches is not None
-    return Case(plant.with_branches(None), plant.branches)
+    return Case(replace(plant, branches=None), plant.branches)
 
 
 def reordered(case: Case, order: np.ndarray) -> Case:

@@ -25,8 +25,7 @@ def inspect_plant(
     from vegtool.branches.table import write_branches
 
     plant = read_plant(path, read)
-    progress("branches", 0.3)
-    branches = branches_of(plant)
+    branches = branches_of(plant, lambda stage, done: progress(stage, 0.3 + 0.7 * done))
     if branches_file is not None:
         write_branches(branches, branches_file, force)
     progress("done", 1.0)

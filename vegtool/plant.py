@@ -5,7 +5,7 @@ Reading (formats/) makes one of these from any file; every operation takes it an
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
@@ -204,7 +204,3 @@ class Plant:
         """(f,) bool: faces whose material is a leaf's."""
         is_leaf = np.array([m.role == "leaf" for m in self.materials])
         return np.asarray(is_leaf[self.face_material])
-
-    def with_branches(self, branches: Branches | None) -> Plant:
-        """The same plant with other knowledge of its branches."""
-        return replace(self, branches=branches)

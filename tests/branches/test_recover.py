@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
+from weakref import ref
 
 import numpy as np
 import pytest
@@ -200,7 +201,7 @@ def test_place_size_and_direction_do_not_matter(name, scale, move, turn):
 
 def test_same_plant_same_answer_and_what_the_file_declares_is_not_looked_at():
     plant = sample("herb")
-    one, other = recover_branches(plant), recover_branches(plant.with_branches(None))
+    one, other = recover_branches(plant), recover_branches(replace(plant, branches=None))
     assert np.array_equal(one.face_branch, other.face_branch)
     assert np.array_equal(one.parent, other.parent)
 
@@ -208,7 +209,17 @@ def test_same_plant_same_answer_and_what_the_file_declares_is_not_looked_at():
 def test_branches_of_prefers_what_the_file_declares():
     plant = sample("herb")
     assert branches_of(plant) is plant.branches
-    assert branches_of(plant.with_branches(None)).source == "recovered"
+    assert branches_of(replace(plant, branches=None)).source == "recovered"
+
+
+def test_branches_are_recovered_once_for_each_plant_and_forgotten_with_it():
+    plant = small_tree()
+    found = branches_of(plant)
+    assert branches_of(plant) is found
+    assert branches_of(replace(plant)) is not found
+    kept = ref(plant)
+    del plant
+    assert kept() is None
 
 
 def test_progress_runs_from_nought_to_one():

@@ -9,6 +9,8 @@ leaves by texture. Few files keep that order, so here geometry speaks first: woo
 
 from __future__ import annotations
 
+from weakref import WeakKeyDictionary
+
 import numpy as np
 
 from vegtool.arrays import FloatArray
@@ -21,10 +23,17 @@ from vegtool.branches.tubes import cut_tubes
 from vegtool.plant import Branches, Plant
 from vegtool.progress import Progress, silent
 
+_recovered: WeakKeyDictionary[Plant, Branches] = WeakKeyDictionary()
+"""Of plants that are still in use: every level of a chain asks."""
+
 
 def branches_of(plant: Plant, progress: Progress = silent) -> Branches:
-    """What the file declares of its branches, else what can be recovered."""
-    return plant.branches or recover_branches(plant, progress)
+    """What the file declares of its branches, else what can be recovered, once for each plant."""
+    if plant.branches is not None:
+        return plant.branches
+    if plant not in _recovered:
+        _recovered[plant] = recover_branches(plant, progress)
+    return _recovered[plant]
 
 
 def recover_branches(plant: Plant, progress: Progress = silent) -> Branches:
