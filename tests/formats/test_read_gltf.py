@@ -325,6 +325,22 @@ def test_second_texture_coordinates(tmp_path: Path) -> None:
     assert np.array_equal(plant.uvs, other)
 
 
+@pytest.mark.parametrize(
+    ("wrap", "size", "noted"), [(33071, 2, True), (33071, 1, False), (10497, 2, False)]
+)
+def test_textures_that_do_not_repeat_are_noted_where_it_shows(
+    tmp_path: Path, wrap: int, size: float, noted: bool
+) -> None:
+    made = Gltf()
+    info = {"index": made.image(png(leaf_pixels()))}
+    made.json["samplers"] = [{"wrapS": wrap}]
+    made.json["textures"][0]["sampler"] = 0
+    leaf = made.material(pbrMetallicRoughness={"baseColorTexture": info})
+    made.node(mesh=made.mesh(material=leaf, TEXCOORD_0=(size * QUAD_UV).astype(np.float32)))
+    plant = read_plant(made.write(tmp_path / "wrapped.glb"))
+    assert any("clamped or mirrored" in note for note in plant.notes) == noted
+
+
 def leaf_card(tmp_path: Path, image: bytes, factor: Any = (1, 1, 1, 1), **entry: Any) -> Plant:
     made = Gltf()
     surface = {

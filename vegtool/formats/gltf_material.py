@@ -18,13 +18,19 @@ from vegtool.formats.gltf_data import GltfFile
 from vegtool.formats.images import decode
 from vegtool.plant import Material, Texture
 
+REPEAT = 10497
+
 
 @dataclass(frozen=True, eq=False)
 class UvSource:
-    """Which texture coordinates a material reads, and the (2, 3) transform it puts on them."""
+    """Which texture coordinates a material reads, and the (2, 3) transform it puts on them.
+
+    repeats: whether its sampler repeats the picture beyond the edges, as a Plant's textures do.
+    """
 
     set: int = 0
     transform: FloatArray | None = None
+    repeats: bool = True
 
     def same_as(self, other: UvSource) -> bool:
         """Whether both give the same coordinates."""
@@ -122,15 +128,25 @@ def _texture(
     if info is None:
         return None, UvSource()
     extension = info.get("extensions", {}).get("KHR_texture_transform", {})
+    texture = file.entry("textures", info.get("index"))
     uvs = UvSource(
-        int(extension.get("texCoord", info.get("texCoord", 0))), _uv_transform(extension)
+        int(extension.get("texCoord", info.get("texCoord", 0))),
+        _uv_transform(extension),
+        _repeats(file, texture),
     )
-    image = _image_index(file, file.entry("textures", info.get("index")))
+    image = _image_index(file, texture)
     if image is None:
         return None, uvs
     if image not in images:
         images[image] = _image(file, image, notes)
     return images[image], uvs
+
+
+def _repeats(file: GltfFile, texture: dict[str, Any]) -> bool:
+    if "sampler" not in texture:
+        return True
+    sampler = file.entry("samplers", texture["sampler"])
+    return all(sampler.get(axis, REPEAT) == REPEAT for axis in ("wrapS", "wrapT"))
 
 
 def _image_index(file: GltfFile, texture: dict[str, Any]) -> int | None:

@@ -47,6 +47,8 @@ TRIANGLES, STRIP, FAN = 4, 5, 6
 OVERFLOW = 2**16
 """Vertices that 16-bit indices can reach."""
 FLOAT32_STEP = 2.0**-23
+BEYOND = 0.01
+"""Of a texture's side: as far as its coordinates may leave it without another texel to see."""
 COARSE = 1e-3
 """Fraction of a mesh's extent: coordinates rounded to coarser steps are worth a warning."""
 
@@ -180,6 +182,10 @@ def _read_primitive(
         )
     _check_overflow(file, primitive, indices, count, name)
     uvs = _uvs(attributes.get(f"TEXCOORD_{uv_source.set}"), uv_source)
+    if uvs is not None and not uv_source.repeats and (np.abs(uvs - 0.5) > 0.5 + BEYOND).any():
+        notes.append(
+            f"mesh {name}: its texture is to be clamped or mirrored beyond its edges; it repeats"
+        )
     colors = attributes.get("COLOR_0")
     if colors is not None:
         colors = settle_colors(colors, textured[material], f"mesh {name}", notes)
