@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from box_cases import box_points, card, plant_of, some_rotation
+from box_cases import box_points, card, some_rotation
+from plants import plant_of
 
 from vegtool.arrays import FloatArray
 from vegtool.boxes import BoxOptions, make_billboards, planes_per_cluster

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from box_cases import box_points, plant_of
+from box_cases import box_points
+from plants import plant_of
 
 from vegtool.arrays import IntArray
 from vegtool.boxes import BoxOptions, fit_budget

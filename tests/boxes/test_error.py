@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from box_cases import box_points, card, plant_of, some_rotation
+from box_cases import box_points, card, some_rotation
+from plants import plant_of
 
 from vegtool.boxes import BoxOptions, geometric_error, make_billboards
 from vegtool.boxes.error import surface_samples

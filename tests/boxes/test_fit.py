@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
-from box_cases import box_points, one, real_plant, some_rotation
+from box_cases import box_points, one, some_rotation
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -18,6 +19,7 @@ from vegtool.boxes import Boxes, BoxOptions, fit_boxes
 from vegtool.boxes.box import MIN_EXTENT
 from vegtool.boxes.fit import START_GRID, box_sides, even_directions, extreme_rows
 from vegtool.clustering import ClusterOptions, cluster
+from vegtool.formats import read_plant
 
 
 def check(boxes: Boxes, points: FloatArray, labels: np.ndarray) -> None:
@@ -179,9 +181,9 @@ def test_threads_do_not_change_a_byte() -> None:
 
 @pytest.mark.models
 @pytest.mark.parametrize("name", ["eztree_ash_small", "eztree_pine_medium"])
-def test_real_clusters_against_trimesh(name: str) -> None:
+def test_real_clusters_against_trimesh(models: Path, name: str) -> None:
     """The whole table, with oak and the dense search, is benchmarks/boxes.py."""
-    plant = real_plant(name)
+    plant = read_plant(models / name / f"{name}.glb")
     labels = cluster(plant, "kmeans", 64, ClusterOptions(orientation_weight=0.0))
     points, member = plant.corners.reshape(-1, 3), np.repeat(labels, 3)
     each = [points[member == k] for k in range(64)]

@@ -6,22 +6,7 @@ import numpy as np
 
 from vegtool.clustering import ClusterOptions
 from vegtool.clustering.features import face_features, face_weights
-from vegtool.plant import Branches, Material, Plant
-
-
-def plant_of(corners: np.ndarray, branches: Branches | None = None) -> Plant:
-    """A plant from (f, 3, 3) corners, as a triangle soup."""
-    n = 3 * len(corners)
-    return Plant(
-        name="test",
-        positions=np.asarray(corners, dtype=np.float64).reshape(-1, 3),
-        normals=np.tile([0.0, 1.0, 0.0], (n, 1)),
-        uvs=np.zeros((n, 2)),
-        faces=np.arange(n, dtype=np.int32).reshape(-1, 3),
-        face_material=np.zeros(len(corners), dtype=np.int32),
-        materials=(Material("leaf", role="leaf"),),
-        branches=branches,
-    )
+from vegtool.plant import Branches, Plant
 
 
 def cards(n: int, seed: int = 0, size: float = 0.1) -> np.ndarray:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from cluster_cases import cards, plant_of, random_branches, same_partition
+from cluster_cases import cards, random_branches, same_partition
+from plants import plant_of
 
 from vegtool.clustering import ClusterOptions, cluster
 from vegtool.clustering.branches import PER_BRANCH, covered_level

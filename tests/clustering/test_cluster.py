@@ -10,9 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cluster_cases import cards, inertia, plant_of, random_branches, same_partition
+from cluster_cases import cards, inertia, random_branches, same_partition
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from plants import plant_of
 
 from vegtool.clustering import METHODS, ClusterOptions, cluster
 from vegtool.errors import UsageError
@@ -192,7 +193,8 @@ def test_elongation_out_of_range_is_refused(elongation: float) -> None:
 
 SCRIPT = """
 import hashlib
-from cluster_cases import cards, plant_of, random_branches
+from cluster_cases import cards, random_branches
+from plants import plant_of
 from vegtool.clustering import METHODS, cluster
 corners = cards(12_000)
 plant = plant_of(corners, random_branches(len(corners), 9))
@@ -210,7 +212,7 @@ def test_same_bytes_for_any_number_of_threads() -> None:
         env = {
             **os.environ,
             **dict.fromkeys(names, threads),
-            "PYTHONPATH": str(Path(__file__).parent),
+            "PYTHONPATH": os.pathsep.join(map(str, Path(__file__).parents[:2])),
         }
         run = subprocess.run(
             [sys.executable, "-c", SCRIPT], env=env, capture_output=True, text=True, check=True

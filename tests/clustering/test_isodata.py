@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from cluster_cases import cards, plant_of
+from cluster_cases import cards
+from plants import plant_of
 
 from vegtool.clustering import ClusterOptions, cluster
 from vegtool.plant import Plant

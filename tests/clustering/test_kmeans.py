@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cluster_cases import cards, inertia, plant_of
+from cluster_cases import cards, inertia
+from plants import plant_of
 
 from vegtool.clustering import ClusterOptions, cluster
 from vegtool.clustering.features import face_features, face_weights, quads
