@@ -8,9 +8,11 @@ import subprocess
 import sys
 from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from vegtool.batch import find_jobs
 from vegtool.cli import run
 from vegtool.formats.gltf import plant_glb
 from vegtool.growth import sample
@@ -120,6 +122,10 @@ def test_one_bad_file_does_not_stop_the_others(
         (["sample", "triffid", "-o", "x.glb"], 2, "broadleaf"),
         (["sample", "bush", "--triangles", "-3", "-o", "x.glb"], 2, "-3"),
         (["nonsense"], 2, "nonsense"),
+        (["convert", "", "-o", "out"], 2, "empty"),
+        (["convert", "bush.glb", "-o", ""], 2, "empty"),
+        (["convert", "modles", "-o", "out"], 1, "nothing there"),
+        (["convert", "bush.glb", "-o", "out", "--unit", "1e-300"], 2, "--unit"),
     ],
 )
 def test_a_mistake_is_a_sentence_and_the_right_exit_code(
@@ -200,3 +206,128 @@ main()
     assert "interrupted" in done.stderr
     assert "Traceback" not in done.stderr
     assert [p.name for p in out.iterdir()] == ["mine.txt"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no SIGINT to a process of one's own on Windows")
+@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM"])
+def test_an_interrupted_batch_ends_its_workers(model: Path, tmp_path: Path, number: str) -> None:
+    """The signal comes to the first process alone, once both workers have been started."""
+    folder, out = tmp_path / "in", tmp_path / "out"
+    folder.mkdir()
+    for name in "abcd":
+        (folder / f"{name}.glb").write_bytes(model.read_bytes())
+    code = f"""
+import os, signal
+from concurrent.futures import ProcessPoolExecutor as Pool
+submit, count = Pool.submit, 0
+def submit_and_kill(*arguments):
+    global count
+    count += 1
+    if count == 4:
+        signal.setitimer(signal.ITIMER_REAL, 0.5)
+    return submit(*arguments)
+signal.signal(signal.SIGALRM, lambda *_: os.kill(os.getpid(), signal.{number}))
+if __name__ == "__main__":
+    Pool.submit = submit_and_kill
+    from vegtool.cli import main
+    main()
+"""
+    script = tmp_path / "start.py"
+    script.write_text(code)
+    arguments = [sys.executable, str(script), "convert", str(folder), "-o", str(out), "-j", "2"]
+    done = subprocess.run(arguments, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 130
+    assert "Traceback" not in done.stderr
+    assert not out.exists(), "workers end before they write"
+
+
+def test_a_bug_in_one_file_does_not_stop_the_others(
+    model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from vegtool import batch
+
+    read = batch.read_plant
+    (tmp_path / "a.glb").write_bytes(model.read_bytes())
+    (tmp_path / "b.glb").write_bytes(model.read_bytes())
+
+    def read_with_bug(path: Path, options: Any) -> Any:
+        return read(path, options) if path.stem == "b" else 1 // 0
+
+    monkeypatch.setattr(batch, "read_plant", read_with_bug)
+    assert run(["convert", str(tmp_path), "-o", str(tmp_path / "o"), *SMALL]) == 3
+    assert "a.glb: vegtool failed in a way that it does not know" in capsys.readouterr().err
+    assert (tmp_path / "o" / "b.glb").exists()
+    assert run(["convert", str(tmp_path / "a.glb"), "-o", str(tmp_path / "o"), "-vv"]) == 1
+    assert "ZeroDivisionError" in capsys.readouterr().err
+
+
+def test_a_folder_named_like_a_model_is_no_model(model: Path, tmp_path: Path) -> None:
+    (tmp_path / "folder.glb").mkdir()
+    (tmp_path / "UPPER.GLB").write_bytes(model.read_bytes())
+    assert [job.name for job in find_jobs([tmp_path])] == ["UPPER"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="file names need not be Unicode on Linux only")
+def test_a_name_that_is_no_unicode(model: Path, tmp_path: Path) -> None:
+    source = tmp_path / os.fsdecode(b"bad\xff.glb")
+    source.write_bytes(model.read_bytes())
+    out = tmp_path / "out"
+    arguments = [sys.executable, "-m", "vegtool", "convert", str(source), "-o", str(out), *SMALL]
+    done = subprocess.run(arguments, capture_output=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert os.fsencode(out / "bad") + b"\xff.glb" in map(os.fsencode, out.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("billboards = 24\nwidth = 3", "line 2: no option is called 'width'"),
+        ("[convert]\nbillboards = 24", "line 1: expected keys alone"),
+        ("billboards = true", "line 1: expected a value for billboards, found true"),
+        ('billboards = "many"', "--billboards"),
+        ("billboards = [24]", "--billboards"),
+        ("billboards = ", "expected TOML"),
+        ("convert = 5", "no option is called 'convert'"),
+    ],
+)
+def test_a_configuration_with_a_mistake(
+    text: str, sentence: str, model: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = tmp_path / "c.toml"
+    config.write_text(text)
+    assert run(["convert", str(model), "-o", str(tmp_path / "o"), "--config", str(config)]) == 2
+    assert sentence in capsys.readouterr().err
+
+
+def test_a_configuration_names_flags(
+    model: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = tmp_path / "c.toml"
+    config.write_text('billboards = 7\nlevels = 1\nleaf-material = "b*"\nmax-texture = 64\n')
+    arguments = ["convert", str(model), "-o", str(tmp_path / "o"), "--config", str(config)]
+    assert run([*arguments, "--billboards", "9", "--json"]) == 0
+    (outcome,) = json.loads(capsys.readouterr().out)
+    assert 7 < outcome["levels"][1]["billboards"] <= 9, "flags win"
+    assert outcome["levels"][1]["texels"] <= 2 * 64**2, "of colour and of normals"
+
+
+@pytest.mark.skipif(os.name == "nt" or not hasattr(os, "mkfifo"), reason="POSIX streams")
+@pytest.mark.parametrize("redirection", ["2>&-", ">&-", "| true", ">/dev/full"])
+def test_closed_and_full_streams_give_no_traceback(redirection: str) -> None:
+    if "full" in redirection and not Path("/dev/full").exists():
+        pytest.skip("no /dev/full here")
+    command = f"{sys.executable} -m vegtool sample --list {redirection}"
+    done = subprocess.run(command, shell=True, capture_output=True, text=True, timeout=60)
+    assert "Traceback" not in done.stderr
+    assert "bug" not in done.stdout + done.stderr
+
+
+def test_a_file_that_may_not_be_read(
+    model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refuse(path: Path) -> bytes:
+        raise PermissionError(13, "Permission denied", str(path))
+
+    monkeypatch.setattr(Path, "read_bytes", refuse)
+    assert run(["convert", str(model), "-o", str(tmp_path / "o"), *SMALL]) == 1
+    assert "bush.glb: cannot be read (Permission denied)" in capsys.readouterr().err

@@ -5,19 +5,25 @@ One bad file does not stop the others, and each file's outputs appear whole or n
 
 from __future__ import annotations
 
+import signal
+import threading
+import traceback
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from vegtool.convert import ConvertOptions, convert
-from vegtool.errors import InputError, UsageError, VegtoolError
+from vegtool.errors import InputError, UsageError, VegtoolError, unknown
 from vegtool.formats import READERS, ReadOptions, read_plant
 from vegtool.lod import LodChain
 from vegtool.progress import Progress, silent
+
+if TYPE_CHECKING:
+    from multiprocessing.synchronize import Event
 
 
 @dataclass(frozen=True)
@@ -42,6 +48,8 @@ class Outcome:
     seconds: float = 0.0
     error: str | None = None
     exit_code: int = 0
+    trace: str = ""
+    """Where an error that vegtool does not know came from."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +73,7 @@ def find_jobs(inputs: Sequence[Path]) -> list[Job]:
     sources: list[Path] = []
     for path in inputs:
         if path.is_dir():
-            models = sorted(p for p in path.iterdir() if p.suffix.lower() in READERS)
+            models = _models_in(path)
             if not models:
                 known = " ".join(READERS)
                 raise InputError(f"{path}: expected models ({known}) in this folder, found none")
@@ -129,18 +137,67 @@ def convert_files(
             yield _outcome(job, task, progress(job))
         return
     from concurrent.futures import ProcessPoolExecutor
+    from concurrent.futures.process import BrokenProcessPool
     from multiprocessing import get_context
 
     # spawn: a GL context does not survive a fork
-    with ProcessPoolExecutor(min(workers, len(jobs)), get_context("spawn")) as pool:
-        futures = [pool.submit(_outcome, job, task) for job in jobs]
+    spawn = get_context("spawn")
+    stop = spawn.Event()
+    with ProcessPoolExecutor(min(workers, len(jobs)), spawn, _in_worker, (stop,)) as pool:
+        with _interrupts_ignored():
+            futures = [pool.submit(_outcome, job, task, _or_stop) for job in jobs]
         try:
             for done, (job, future) in enumerate(zip(jobs, futures, strict=True), start=1):
-                yield future.result()
+                try:
+                    yield future.result()
+                except BrokenProcessPool:
+                    yield Outcome(job, error=f"{job.source}: {_WORKER_DIED}", exit_code=1)
                 progress(job)("done", done / len(jobs))
         except BaseException:
+            stop.set()
             pool.shutdown(cancel_futures=True)
             raise
+
+
+_WORKER_DIED = (
+    "the process that converted it, or one beside it, was ended from outside, mostly for want of"
+    " memory; fewer files at a time (-j) need less"
+)
+_stop: Event | None = None
+"""In a worker: set once the whole batch is to end."""
+
+
+def _in_worker(stop: Event) -> None:
+    """What a worker does first: leave Ctrl-C to the process that started it."""
+    global _stop
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _stop = stop
+
+
+def _or_stop(stage: str, fraction: float) -> None:
+    """A worker's progress: its chance to end, and to leave nothing half-written."""
+    if _stop is not None and _stop.is_set():
+        raise KeyboardInterrupt
+
+
+@contextmanager
+def _interrupts_ignored() -> Iterator[None]:
+    """Processes started meanwhile begin deaf to Ctrl-C, which a terminal sends to all of them."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _models_in(folder: Path) -> list[Path]:
+    try:
+        return sorted(p for p in folder.iterdir() if p.suffix.lower() in READERS and not p.is_dir())
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be read ({error.strerror}); allow it") from error
 
 
 def _outcome(job: Job, task: Task, progress: Progress = silent) -> Outcome:
@@ -151,6 +208,9 @@ def _outcome(job: Job, task: Task, progress: Progress = silent) -> Outcome:
     except MemoryError:
         message = f"{job.source}: not enough memory; fewer billboards or --max-texture need less"
         return Outcome(job, error=message, exit_code=1)
+    except Exception as error:
+        message = f"{job.source}: {unknown(error)}"
+        return Outcome(job, error=message, exit_code=1, trace=traceback.format_exc())
 
 
 def _row(chain: LodChain, index: int) -> dict[str, Any]:

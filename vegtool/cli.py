@@ -6,7 +6,9 @@ Exit codes: 0 done, 1 failed, 2 usage, 3 part of a batch failed, 4 a quality lim
 
 from __future__ import annotations
 
+import signal
 import sys
+from io import TextIOWrapper
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,7 +17,7 @@ import typer
 from vegtool import __version__
 from vegtool.console import Console, human_bytes, table
 from vegtool.convert import ConvertOptions
-from vegtool.errors import BatchError, VegtoolError
+from vegtool.errors import BatchError, UsageError, VegtoolError, unknown
 from vegtool.flags import flags, read_config
 from vegtool.formats import ReadOptions
 
@@ -31,7 +33,18 @@ app = typer.Typer(
 
 INTERRUPTED = 130
 
-Out = Annotated[Path, typer.Option("-o", "--out", help="Folder for what is made.")]
+
+def _path(text: str) -> Path:
+    """A path as typed; the empty one, mostly a variable that was not set, is no folder."""
+    if not text:
+        raise UsageError("expected a file or a folder; got an empty name")
+    return Path(text)
+
+
+Out = Annotated[
+    Path,
+    typer.Option("-o", "--out", help="Folder for what is made.", metavar="FOLDER", parser=_path),
+]
 Force = Annotated[bool, typer.Option("-f", "--force", help="Overwrite files of the same names.")]
 Json = Annotated[bool, typer.Option("--json", help="The result as JSON on stdout.")]
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Errors only.")]
@@ -62,7 +75,9 @@ def root(
 @flags
 def convert_command(
     *,
-    inputs: Annotated[list[Path], typer.Argument(help="Plant models, or folders of them.")],
+    inputs: Annotated[
+        list[Path], typer.Argument(help="Plant models, or folders of them.", parser=_path)
+    ],
     out: Out,
     convert: ConvertOptions,
     read: ReadOptions,
@@ -97,6 +112,7 @@ def convert_command(
     for outcome in outcomes:
         if outcome.error:
             console.say(f"error: {outcome.error}", at=-1)
+            console.say(outcome.trace, at=2)
             continue
         for note in outcome.notes:
             console.say(f"{outcome.job.name}: {note}")
@@ -113,7 +129,7 @@ def convert_command(
 @flags
 def inspect_command(
     *,
-    model: Annotated[Path, typer.Argument(help="A plant model.")],
+    model: Annotated[Path, typer.Argument(help="A plant model.", parser=_path)],
     read: ReadOptions,
     branches: Annotated[
         Path | None,
@@ -237,7 +253,23 @@ def _summary(outcomes: list[Any], dry_run: bool) -> str:
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit with its code."""
+    _be_ended_politely()
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):  # names that the terminal cannot show are escaped
+            stream.reconfigure(errors="backslashreplace")
     sys.exit(run(arguments))
+
+
+def _be_ended_politely() -> None:
+    """Clean up on `kill` and on a terminal that closes as on Ctrl-C."""
+
+    def interrupt(number: int, frame: object) -> None:
+        raise KeyboardInterrupt
+
+    for name in ("SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)  # Windows has no SIGHUP
+        if number is not None and signal.getsignal(number) is signal.SIG_DFL:  # not under nohup
+            signal.signal(number, interrupt)
 
 
 def run(arguments: list[str] | None = None) -> int:
@@ -250,9 +282,9 @@ def run(arguments: list[str] | None = None) -> int:
             raise KeyboardInterrupt
         return int(code)
     except typer.TyperException as error:
-        print(
-            f"error: {error.format_message()} (vegtool --help lists what there is)", file=sys.stderr
-        )
+        message = error.format_message()
+        if message:  # none where the help was shown for want of arguments
+            print(f"error: {message} (vegtool --help lists what there is)", file=sys.stderr)
         return error.exit_code
     except (KeyboardInterrupt, typer.Abort):
         print("interrupted: nothing is left half-written", file=sys.stderr)
@@ -262,14 +294,14 @@ def run(arguments: list[str] | None = None) -> int:
         return error.exit_code
     except BrokenPipeError:
         return 0
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else "the output could not be written: "
+        print(f"error: {where}{error.strerror}", file=sys.stderr)
+        return 1
     except Exception as error:
         if "-vv" in given:
             raise
-        print(
-            f"error: vegtool failed in a way that it does not know ({type(error).__name__}:"
-            f" {error}); this is a bug: run again with -vv and report what it prints",
-            file=sys.stderr,
-        )
+        print(f"error: {unknown(error)}", file=sys.stderr)
         return 1
 
 

@@ -37,7 +37,7 @@ class Console:
     @contextmanager
     def bar(self, title: str) -> Iterator[Progress]:
         """A progress callback; a bar appears on a terminal once the work takes over a second."""
-        if self.verbosity < 0 or not sys.stderr.isatty():
+        if self.verbosity < 0 or not (sys.stderr and sys.stderr.isatty()):
             yield silent
             return
         from rich.console import Console as RichConsole

@@ -50,3 +50,11 @@ class CapabilityError(VegtoolError):
     """A decoder, a GL feature or an optional part is missing here."""
 
     exit_code = 5
+
+
+def unknown(error: Exception) -> str:
+    """The sentence for an error that is none of these: a bug."""
+    return (
+        f"vegtool failed in a way that it does not know ({type(error).__name__}: {error});"
+        " this is a bug: run again with -vv and report what it prints"
+    )

@@ -8,6 +8,7 @@ together again before the command runs.
 from __future__ import annotations
 
 import inspect
+import re
 import tomllib
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
@@ -77,7 +78,8 @@ def _panel(group: str) -> str:
 def read_config(context: typer.Context, path: Path | None) -> Path | None:
     """Callback of `--config`: the file's keys become the defaults of this command's flags.
 
-    Raises UsageError with the line of an unknown key.
+    A key is the long name of a flag. Raises UsageError with the line of a key that is unknown or
+    has no value of its flag's kind.
     """
     if path is None:
         return None
@@ -88,17 +90,34 @@ def read_config(context: typer.Context, path: Path | None) -> Path | None:
         raise UsageError(f"{path}: cannot read this configuration ({error.strerror})") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise UsageError(f"{path}: expected TOML; {error}") from error
-    values = values.get(context.info_name or "", values)
-    known = {p.name for p in context.command.params if p.param_type_name == "option"} - {"config"}
+    known = {
+        name.removeprefix("--").replace("-", "_"): p
+        for p in context.command.params
+        if p.param_type_name == "option" and p.name not in ("config", "help")
+        for name in p.opts
+        if name.startswith("--")
+    }
     found: dict[str, Any] = {}
     for key, value in values.items():
-        name = key.replace("-", "_")
-        if name not in known:
-            line = next(
-                (i for i, t in enumerate(text.splitlines(), 1) if t.lstrip().startswith(key)), 0
+        option = known.get(key.replace("-", "_"))
+        if isinstance(value, dict):
+            raise UsageError(f"{_place(path, text, key)}: expected keys alone, found a [{key}]")
+        if option is None:
+            choices = ", ".join(sorted(known))
+            raise UsageError(
+                f"{_place(path, text, key)}: no option is called {key!r}; known: {choices}"
             )
-            choices = ", ".join(sorted(str(k) for k in known))
-            raise UsageError(f"{path}, line {line}: no option is called {key!r}; known: {choices}")
-        found[name] = value
+        if isinstance(value, bool) and not getattr(option, "is_flag", False):
+            raise UsageError(
+                f"{_place(path, text, key)}: expected a value for {key}, found {str(value).lower()}"
+            )
+        found[str(option.name)] = [value] if option.multiple and isinstance(value, str) else value
     context.default_map = {**(context.default_map or {}), **found}
     return path
+
+
+def _place(path: Path, text: str, key: str) -> str:
+    """File and line of a key, as far as a plain search can tell."""
+    start = re.compile(rf"""\s*\[?["']?{re.escape(key)}\b""")
+    line = next((i for i, t in enumerate(text.splitlines(), 1) if start.match(t)), None)
+    return f"{path}, line {line}" if line else f"{path}"

@@ -6,6 +6,7 @@ line in READERS. What each format's quirks become is written in docs/formats.md.
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -40,6 +41,9 @@ CONVERTERS = {
 
 METRES_PER = {"mm": 0.001, "cm": 0.01, "dm": 0.1, "m": 1.0, "in": 0.0254, "ft": 0.3048}
 
+SMALLEST, LARGEST = 1e-9, 1e9
+"""Metres: the range of units and of plants. Beyond, 32-bit files and GPUs lose count."""
+
 UP_AXES = ("auto", "x", "y", "z", "-x", "-y", "-z")
 
 
@@ -63,8 +67,10 @@ class ReadOptions:
     def __post_init__(self) -> None:
         if self.up not in UP_AXES:
             raise UsageError(f"--up: expected one of {', '.join(UP_AXES)}; found {self.up!r}")
-        if not 0 < self.metres < float("inf"):
-            raise UsageError(f"--unit: expected a positive number of metres; found {self.unit!r}")
+        if not SMALLEST <= self.metres <= LARGEST:
+            raise UsageError(
+                f"--unit: expected {SMALLEST:g} to {LARGEST:g} metres; found {self.unit!r}"
+            )
 
     @property
     def metres(self) -> float:
@@ -87,6 +93,17 @@ def read_plant(path: str | Path, options: ReadOptions = ReadOptions()) -> Plant:
     that needs a converter or a decoder that is not here; each message names file and remedy.
     """
     path = Path(path)
+    try:
+        return _read(path, options)
+    except OSError as error:
+        raise InputError(
+            f"{error.filename or path}: cannot be read ({error.strerror}); allow it, or copy it"
+        ) from error
+
+
+def _read(path: Path, options: ReadOptions) -> Plant:
+    if not os.path.lexists(path):
+        raise InputError(f"{path}: expected a model file, found nothing there; check the path")
     extension = path.suffix.lower()
     if extension in CONVERTERS:
         raise CapabilityError(
@@ -103,4 +120,11 @@ def read_plant(path: str | Path, options: ReadOptions = ReadOptions()) -> Plant:
         raise InputError(f"{path}: expected a model file, found {found} there; check the path")
     from vegtool.formats.read import assemble  # numpy and Pillow load only when a file is read
 
-    return assemble(import_module(READERS[extension]).parse(path), path, options)
+    plant = assemble(import_module(READERS[extension]).parse(path), path, options)
+    size = float((plant.bounds[1] - plant.bounds[0]).max())
+    if not SMALLEST <= size <= LARGEST:
+        raise InputError(
+            f"{path}: expected a plant of {SMALLEST:g} to {LARGEST:g} metres, found one of "
+            f"{size:.3g}; say the file's unit with --unit"
+        )
+    return plant

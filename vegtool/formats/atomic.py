@@ -12,7 +12,7 @@ import secrets
 import shutil
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from errno import EDQUOT, EEXIST, EFBIG, ENOSPC, ENOTDIR
+from errno import EDQUOT, EEXIST, EFBIG, ENAMETOOLONG, ENOSPC, ENOTDIR
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -155,6 +155,8 @@ def _explained(path: Path) -> Iterator[None]:
             reason = f"there is no room for it ({error.strerror}). Free some space, or choose"
         elif error.errno in (ENOTDIR, EEXIST):
             reason = "a file stands where its folder should be. Choose"
+        elif error.errno == ENAMETOOLONG:
+            reason = "the name is too long here. Rename the input, or choose"
         else:
             reason = f"cannot be written ({error.strerror}). Allow it, or choose"
         raise OutputError(f"{path}: {reason} another folder with -o.") from error

@@ -95,7 +95,7 @@ class Document:
         binary += bytes(-len(binary) % _ALIGNMENT)
         objects = {**self._objects, "buffers": [{"byteLength": len(binary)}]}
         text = json.dumps(objects, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-        chunk = text.encode()
+        chunk = text.encode(errors="replace")  # half a surrogate pair, from a file or its name
         chunk += b" " * (-len(chunk) % _ALIGNMENT)
         total = 12 + 8 + len(chunk) + 8 + len(binary)
         return b"".join(

@@ -104,7 +104,8 @@ def screen_height_fraction(chain: LodChain, distance_m: float) -> float:
 
 def encode(values: dict[str, Any]) -> bytes:
     """A manifest as the bytes of its file."""
-    return (json.dumps(values, indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
+    text = json.dumps(values, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return text.encode(errors="replace")  # a file name need not be Unicode, JSON must
 
 
 def read_manifest(path: Path) -> dict[str, Any]:
