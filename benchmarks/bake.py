@@ -15,13 +15,13 @@ on what else the machine does. Pictures have about `--side` texels a side, 4 x 4
 from __future__ import annotations
 
 import argparse
-import csv
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 import moderngl
 import numpy as np
+from recorded import record
 
 from vegtool import __version__
 from vegtool.arrays import IntArray
@@ -35,7 +35,6 @@ from vegtool.gl.program import source
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Billboards
 
-RESULTS = Path(__file__).parent / "results" / "bake.csv"
 SAMPLES = 4
 VERTEX = """#version 330 core
 uniform mat4 matrix;
@@ -153,13 +152,7 @@ def main() -> None:
     for row in rows:
         print("  ".join(f"{k} {v}" for k, v in row.items()))
     if args.row:
-        new = not RESULTS.exists()
-        RESULTS.parent.mkdir(exist_ok=True)
-        with RESULTS.open("a", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, rows[0].keys())
-            if new:
-                writer.writeheader()
-            writer.writerows(rows)
+        record("bake", rows)
 
 
 if __name__ == "__main__":

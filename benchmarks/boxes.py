@@ -15,13 +15,13 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import csv
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import trimesh
+from recorded import record
 from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.transform import Rotation
 
@@ -32,7 +32,6 @@ from vegtool.boxes.box import MIN_EXTENT
 from vegtool.clustering import ClusterOptions, cluster
 from vegtool.formats import read_plant
 
-RESULTS = Path(__file__).parent / "results" / "boxes.csv"
 STARTS, FOLLOWED = 3000, 40
 
 
@@ -117,13 +116,7 @@ def main() -> None:
         print("  ".join(f"{value!s:>15}" for value in row.values()), flush=True)
         written.append(row)
     if args.row and written:
-        RESULTS.parent.mkdir(exist_ok=True)
-        fresh = not RESULTS.exists()
-        with RESULTS.open("a", newline="") as file:
-            writer = csv.DictWriter(file, list(written[0]))
-            if fresh:
-                writer.writeheader()
-            writer.writerows(written)
+        record("boxes", written)
 
 
 if __name__ == "__main__":

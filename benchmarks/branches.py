@@ -19,7 +19,6 @@ plants, whose generator knows their branches. `--row` appends to benchmarks/resu
 from __future__ import annotations
 
 import argparse
-import csv
 import os
 import statistics
 import time
@@ -28,6 +27,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from recorded import record
 
 import vegtool
 from vegtool.branches import recover_branches
@@ -36,7 +36,6 @@ from vegtool.growth import SAMPLES, sample
 from vegtool.plant import Branches, Plant
 from vegtool.seeding import generator
 
-RESULTS = Path(__file__).parent / "results" / "branches.csv"
 MODELS = (
     "eztree_ash_small",
     "eztree_pine_medium",
@@ -208,12 +207,7 @@ def main() -> None:
         print("  ".join(f"{value!s:>13}" for value in row.values()), flush=True)
         written.append(row)
     if args.row and written:
-        fresh = not RESULTS.exists()
-        with RESULTS.open("a", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, list(written[0]))
-            if fresh:
-                writer.writeheader()
-            writer.writerows(written)
+        record("branches", written)
 
 
 if __name__ == "__main__":

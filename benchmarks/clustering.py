@@ -15,21 +15,19 @@ seconds of the processor, median of three
 from __future__ import annotations
 
 import argparse
-import csv
 import statistics
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from recorded import record
 
 from vegtool.arrays import IntArray, unit
 from vegtool.boxes import oriented_planes
 from vegtool.clustering import METHODS, ClusterOptions, cluster
 from vegtool.formats import read_plant
 from vegtool.plant import Plant
-
-RESULTS = Path(__file__).parent / "results" / "clustering.csv"
 
 
 def quality(plant: Plant, labels: IntArray) -> dict[str, float]:
@@ -112,12 +110,7 @@ def main() -> None:
         print("  ".join(f"{shown(value):>9}" for value in row.values()), flush=True)
         written.append(row)
     if args.row and written:
-        fresh = not RESULTS.exists()
-        with RESULTS.open("a", newline="") as file:
-            writer = csv.DictWriter(file, list(written[0]))
-            if fresh:
-                writer.writeheader()
-            writer.writerows([{n: shown(v) for n, v in row.items()} for row in written])
+        record("clustering", [{n: shown(v) for n, v in row.items()} for row in written])
 
 
 if __name__ == "__main__":

@@ -10,7 +10,6 @@ included: starting Python, reading, writing, the contact sheet.
 from __future__ import annotations
 
 import argparse
-import csv
 import os
 import platform
 import subprocess
@@ -21,6 +20,7 @@ from pathlib import Path
 from statistics import median
 
 import numpy as np
+from recorded import record
 
 from vegtool import __version__
 from vegtool.formats.gltf import plant_glb
@@ -28,7 +28,6 @@ from vegtool.growth import sample
 from vegtool.measure.pictures import renderer
 
 ROOT = Path(__file__).resolve().parent.parent
-RESULTS = ROOT / "benchmarks" / "results" / "convert.csv"
 PLOT = ROOT / "docs" / "convert_growth.png"
 RUNS = 3
 GROWTH = (10_000, 30_000, 100_000, 300_000, 1_000_000)
@@ -99,7 +98,7 @@ def plot(rows: list[dict[str, object]]) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--record", action="store_true")
-    record = parser.parse_args().record
+    recording = parser.parse_args().record
     rows: list[dict[str, object]] = []
     with tempfile.TemporaryDirectory() as folder:
         for name, triangles, path in cases(Path(folder)):
@@ -115,13 +114,8 @@ def main() -> None:
                 f" ({min(seconds):.2f} to {max(seconds):.2f})  {peak:5d} MB", flush=True,
             )  # fmt: skip
     print(platform.platform(), f"{os.cpu_count()} cores", renderer()["renderer"])
-    if record:
-        new = not RESULTS.exists()
-        with RESULTS.open("a", newline="") as file:
-            writer = csv.DictWriter(file, HEAD, lineterminator="\n")
-            if new:
-                writer.writeheader()
-            writer.writerows(rows)
+    if recording:
+        record("convert", rows)
         plot(rows)
 
 

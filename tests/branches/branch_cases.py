@@ -17,6 +17,7 @@ WOOD, LEAF = Material("bark", role="wood"), Material("leaf", role="leaf")
 def benchmark() -> ModuleType:
     """benchmarks/branches.py."""
     path = Path(__file__).parents[2] / "benchmarks" / "branches.py"
+    sys.path.append(str(path.parent))  # it imports what benchmarks share
     spec = spec_from_file_location("benchmarks_branches", path)
     assert spec is not None and spec.loader is not None
     module = module_from_spec(spec)
