@@ -13,6 +13,8 @@ from vegtool.gl.context import check, framebuffer_kept
 from vegtool.gl.program import program
 from vegtool.gl.upload import PlantBuffers
 
+Picture = npt.NDArray[np.float32]
+"""(height, width, 4): linear light premultiplied by coverage, and coverage."""
 MSAA = 4
 """Samples per pixel of a live picture, as engines do by default."""
 
@@ -35,8 +37,8 @@ def draw(
     light: Light | None = None,
     supersample: int = 1,
     samples: int = 0,
-) -> npt.NDArray[np.float32]:
-    """The picture, (height, width, 4) float32: linear light premultiplied by coverage, coverage.
+) -> Picture:
+    """The picture of a plant or level.
 
     view_projection: (4, 4), for positions relative to `target`, (3,) metres. size: width, height
     in pixels. supersample: pictures drawn that much larger per axis and averaged. samples: of
@@ -85,7 +87,7 @@ def _read(
     height: int,
     supersample: int,
     samples: int,
-) -> npt.NDArray[np.float32]:
+) -> Picture:
     source = frame
     if samples:
         resolved = ctx.texture((width, height), 4, dtype="f2")

@@ -9,10 +9,10 @@ from __future__ import annotations
 from io import BytesIO
 
 import numpy as np
-import numpy.typing as npt
 from PIL import Image, ImageDraw, ImageFont
 
 from vegtool.arrays import ByteArray
+from vegtool.gl.draw import Picture
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Level, LodChain
 from vegtool.measure.pictures import client_plant, live, over, truth
@@ -25,8 +25,6 @@ BACKGROUND = (0.19, 0.27, 0.36)
 """Linear: a light overcast sky, against which both light and dark leaves stand out."""
 PAPER, INK, FAINT = (250, 250, 248), (30, 34, 38), (110, 116, 122)
 VIEW = direction(25.0, 8.0)
-
-Picture = npt.NDArray[np.float32]
 
 
 def contact_sheet(chain: LodChain) -> bytes:

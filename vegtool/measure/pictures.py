@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from vegtool.arrays import ByteArray
 from vegtool.gl.context import describe
-from vegtool.gl.draw import MSAA, Light, draw
+from vegtool.gl.draw import MSAA, Light, Picture, draw
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Level, billboard_quads
 from vegtool.measure.views import Camera
@@ -56,21 +56,19 @@ def truth(
     camera: Camera,
     light: Light | None = None,
     supersample: int = TRUTH_SUPERSAMPLE,
-) -> npt.NDArray[np.float32]:
+) -> Picture:
     """The original as it is: alpha tested per sample, no mips. buffers: without mipmaps."""
     size = camera.width, camera.height
     return draw(buffers, camera.view_projection(), size, camera.target, light, supersample)
 
 
-def live(
-    buffers: PlantBuffers, camera: Camera, light: Light | None = None
-) -> npt.NDArray[np.float32]:
+def live(buffers: PlantBuffers, camera: Camera, light: Light | None = None) -> Picture:
     """What a client shows: mip-mapped textures, alpha tested once per pixel, 4x multisampling."""
     size = camera.width, camera.height
     return draw(buffers, camera.view_projection(), size, camera.target, light, 1, MSAA)
 
 
-def over(picture: npt.NDArray[np.float32], background: npt.ArrayLike) -> ByteArray:
+def over(picture: Picture, background: npt.ArrayLike) -> ByteArray:
     """A linear premultiplied picture (h, w, 4) over a linear colour (3,): sRGB bytes (h, w, 3)."""
     linear = picture[..., :3] + (1 - picture[..., 3:]) * np.asarray(background, np.float32)
     return np.asarray((srgb_from_linear(np.clip(linear, 0, 1)) * 255 + 0.5).astype(np.uint8))
