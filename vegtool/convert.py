@@ -99,7 +99,7 @@ def convert(
 
     options = options or ConvertOptions()
     check_limits(options)
-    levels = [Level("mesh", mesh=plant)]
+    levels = [Level("mesh", mesh=plant, geometric_error_m=(0.0, 0.0))]
     counts = billboard_counts(plant, options)
     with PlantBuffers(plant) as buffers:
         for index, count in enumerate(counts):
