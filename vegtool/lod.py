@@ -79,8 +79,8 @@ class Billboards:
 class Atlas:
     """The textures of a level, and where in them each billboard's picture lies.
 
-    color: (h, w, 4) uint8, sRGB, straight alpha: coverage, fitted in each picture to a test at 128
-    so that as many texels pass as are covered; colour dilated under alpha 0.
+    color: (h, w, 4) uint8, sRGB, straight alpha: coverage, fitted in each picture so that as much
+    of it passes a test at 128 as is covered; colour dilated under alpha 0.
     normal: (h, w, 3) uint8, tangent space of the billboard (x along u, y along v, blue > 0.5).
     depth: (h, w) uint16, signed depth along the side's own normal over the billboard's half_depth:
     32768 is the plane, 65535 half_depth towards the viewer, 1 half_depth behind, 0 nothing.

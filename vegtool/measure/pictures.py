@@ -18,7 +18,7 @@ TRUTH_SUPERSAMPLE = 4
 """Per axis, for pictures that are looked at; scores ask for more."""
 
 
-def client_plant(level: Level, name: str = "level") -> Plant:
+def client_plant(level: Level) -> Plant:
     """A level as the mesh that a client gets from its file, so that one path draws everything."""
     if level.mesh is not None:
         return level.mesh
@@ -26,7 +26,7 @@ def client_plant(level: Level, name: str = "level") -> Plant:
     quads = billboard_quads(level)
     opaque = np.full((*level.atlas.normal.shape[:2], 1), 255, np.uint8)
     material = Material(
-        name,
+        "level",
         color_texture=Texture("color", level.atlas.color),
         normal_texture=Texture("normal", np.concatenate([level.atlas.normal, opaque], axis=2)),
         alpha_mode="mask",
@@ -34,7 +34,7 @@ def client_plant(level: Level, name: str = "level") -> Plant:
     )
     faces = quads.indices.reshape(-1, 3)
     nothing = np.zeros(len(faces), np.int32)
-    return Plant(name, quads.positions, quads.normals, quads.uvs, faces, nothing, (material,))
+    return Plant("level", quads.positions, quads.normals, quads.uvs, faces, nothing, (material,))
 
 
 def renderer() -> dict[str, str]:
