@@ -14,6 +14,7 @@ import pytest
 
 from vegtool.batch import find_jobs
 from vegtool.cli import run
+from vegtool.errors import UsageError
 from vegtool.formats.gltf import plant_glb
 from vegtool.growth import sample
 
@@ -121,6 +122,8 @@ def test_one_bad_file_does_not_stop_the_others(
         (["convert", "bush.glb", "-o", "out", "--config", "none.toml"], 2, "none.toml"),
         (["sample", "triffid", "-o", "x.glb"], 2, "broadleaf"),
         (["sample", "bush", "--triangles", "-3", "-o", "x.glb"], 2, "-3"),
+        (["sample", "bush", "-o", "bush.obj"], 2, ".glb"),
+        (["inspect", "bush.glb", "--branches", "bush.glb", "-f"], 2, ".npz"),
         (["nonsense"], 2, "nonsense"),
         (["convert", "", "-o", "out"], 2, "empty"),
         (["convert", "bush.glb", "-o", ""], 2, "empty"),
@@ -265,6 +268,36 @@ def test_a_folder_named_like_a_model_is_no_model(model: Path, tmp_path: Path) ->
     (tmp_path / "folder.glb").mkdir()
     (tmp_path / "UPPER.GLB").write_bytes(model.read_bytes())
     assert [job.name for job in find_jobs([tmp_path])] == ["UPPER"]
+
+
+def test_what_lies_beside_another_input_is_never_overwritten(model: Path, tmp_path: Path) -> None:
+    """The first input's contact sheet would take the place of the second's texture."""
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "oak.glb").write_bytes(model.read_bytes())
+    (other / "bush.png").write_text("a texture of the oak")
+    before = contents(other)
+    arguments = ["convert", str(model), str(other / "oak.glb"), "-o", str(other), "-f", *SMALL]
+    assert run(arguments) == 3
+    assert contents(other) == before
+
+
+def test_verbose_says_where_the_time_went(
+    model: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["convert", str(model), "--dry-run", *SMALL, "-o", str(tmp_path)]
+    assert run(arguments) == 0
+    assert "clustering" not in capsys.readouterr().err
+    assert run([*arguments, "-v"]) == 0
+    assert "clustering" in capsys.readouterr().err
+
+
+def test_levels_of_an_earlier_run_are_no_models(tmp_path: Path) -> None:
+    for name in ("oak.glb", "oak_LOD1.glb", "oak_LOD2.glb", "oak.lod.json", "mine_LOD1.glb"):
+        (tmp_path / name).touch()
+    assert [job.name for job in find_jobs([tmp_path])] == ["mine_LOD1", "oak"]
+    with pytest.raises(UsageError, match="same name"):
+        find_jobs([tmp_path / "oak.glb", tmp_path / "oak_LOD1.glb"])
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="file names need not be Unicode on Linux only")

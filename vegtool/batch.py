@@ -5,6 +5,7 @@ One bad file does not stop the others, and each file's outputs appear whole or n
 
 from __future__ import annotations
 
+import re
 import signal
 import threading
 import traceback
@@ -62,13 +63,16 @@ class Task:
     force: bool = False
     depth: bool = False
     dry_run: bool = False
+    inputs: tuple[Path, ...] = ()
+    """The other files of the batch: like a job's own, they and what lies beside them are kept."""
 
 
 def find_jobs(inputs: Sequence[Path]) -> list[Job]:
     """The model files named, or found directly inside the folders named, in order.
 
     Two files of the same stem get the extension into their names (oak.glb, oak.obj: oak_glb,
-    oak_obj). Raises InputError for a path that is not there or a folder without models.
+    oak_obj). Raises InputError for a folder without models, UsageError where two inputs would
+    write files of the same name.
     """
     sources: list[Path] = []
     for path in inputs:
@@ -87,7 +91,14 @@ def find_jobs(inputs: Sequence[Path]) -> list[Job]:
         for p, s in zip(unique, stems, strict=True)
     ]
     names = [job.name.lower() for job in jobs]
-    twice = next((job for job in jobs if names.count(job.name.lower()) > 1), None)
+    twice = next(
+        (
+            job
+            for job, name in zip(jobs, names, strict=True)
+            if names.count(name) > 1 or _plant_of_level(name) in names
+        ),
+        None,
+    )
     if twice:
         raise UsageError(
             f"{twice.source}: another input would write files of the same name ({twice.name});"
@@ -111,14 +122,15 @@ def convert_file(job: Job, task: Task, progress: Progress = silent) -> Outcome:
     plant = read_plant(job.source, task.read)
     sheet_name = f"{job.name}.png"
     names = [*file_names(job.name, 1 + task.convert.levels, task.depth), sheet_name]
-    check_free(task.folder, names, task.force, [job.source])
+    inputs = (job.source, *task.inputs)
+    check_free(task.folder, names, task.force, inputs)
     chain = convert(plant, task.convert, lambda s, f: progress(s, 0.05 + 0.75 * f))
     chain = replace(chain, name=job.name)
     progress("contact sheet", 0.8)
     extra = {sheet_name: contact_sheet(chain)}
     progress("writing", 0.9)
     with TemporaryDirectory() if task.dry_run else nullcontext(task.folder) as folder:
-        paths = write_chain(chain, Path(folder), task.force, task.depth, extra, [job.source])
+        paths = write_chain(chain, Path(folder), task.force, task.depth, extra, inputs)
         files = {str(task.folder / p.name): p.stat().st_size for p in paths}
     progress("done", 1.0)
     rows = tuple(_row(chain, i) for i in range(len(chain.levels)))
@@ -193,9 +205,22 @@ def _interrupts_ignored() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
 
 
+def _plant_of_level(name: str) -> str | None:
+    """oak, where the name is that of a level of an oak: oak_LOD1."""
+    found = re.fullmatch(r"(.+)_lod\d+", name, re.IGNORECASE | re.DOTALL)
+    return found[1] if found else None
+
+
 def _models_in(folder: Path) -> list[Path]:
+    """The models in a folder, less the levels that an earlier run left there."""
     try:
-        return sorted(p for p in folder.iterdir() if p.suffix.lower() in READERS and not p.is_dir())
+        return sorted(
+            p
+            for p in folder.iterdir()
+            if p.suffix.lower() in READERS
+            and not p.is_dir()
+            and not (folder / f"{_plant_of_level(p.stem)}.lod.json").exists()
+        )
     except OSError as error:
         raise InputError(f"{folder}: cannot be read ({error.strerror}); allow it") from error
 

@@ -6,6 +6,7 @@ Exit codes: 0 done, 1 failed, 2 usage, 3 part of a batch failed, 4 a quality lim
 
 from __future__ import annotations
 
+import re
 import signal
 import sys
 from io import TextIOWrapper
@@ -103,9 +104,9 @@ def convert_command(
     from vegtool.batch import Task, convert_files, find_jobs
 
     console = Console(-1 if quiet else verbose, json)
-    task = Task(out, read, convert, force, depth, dry_run)
-    outcomes = []
     todo = find_jobs(inputs)
+    task = Task(out, read, convert, force, depth, dry_run, tuple(job.source for job in todo))
+    outcomes = []
     with console.bar("convert") as progress:
         for outcome in convert_files(todo, task, jobs, _file_progress(todo, progress)):
             outcomes.append(outcome)
@@ -116,6 +117,10 @@ def convert_command(
             continue
         for note in outcome.notes:
             console.say(f"{outcome.job.name}: {note}")
+        for row in outcome.levels:
+            spent = ", ".join(f"{stage} {s:.2f} s" for stage, s in row["seconds"].items())
+            if spent:
+                console.say(f"{outcome.job.name}: level {row['level']}: {spent}", at=1)
     console.result([_as_json(o) for o in outcomes], _summary(outcomes, dry_run))
     failed = [o for o in outcomes if o.error]
     if len(outcomes) == 1 and failed:
@@ -175,7 +180,8 @@ def sample_command(
     *,
     name: Annotated[str, typer.Argument(help="Which plant; --list shows them.")] = "",
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="File to write.", metavar="FILE.glb")
+        Path | None,
+        typer.Option("-o", "--out", help="File to write.", metavar="FILE.glb", parser=_path),
     ] = None,
     triangles: Annotated[
         int | None, typer.Option("-t", "--triangles", help="About how many.")
@@ -204,6 +210,8 @@ def sample_command(
     from vegtool.formats.gltf import plant_glb
 
     target = out or Path(f"{name}.glb")
+    if target.suffix.lower() != ".glb":
+        raise UsageError(f"--out: expected a name that ends in .glb; got {target}")
     plant = sample(name, triangles, seed)
     data = plant_glb(plant)
     with FileSet(target.parent, force) as files:
@@ -299,7 +307,7 @@ def run(arguments: list[str] | None = None) -> int:
         print(f"error: {where}{error.strerror}", file=sys.stderr)
         return 1
     except Exception as error:
-        if "-vv" in given:
+        if sum(a.count("v") for a in given if re.fullmatch(r"-\w*v\w*", a)) > 1:
             raise
         print(f"error: {unknown(error)}", file=sys.stderr)
         return 1

@@ -9,6 +9,7 @@ import numpy as np
 
 from vegtool.branches import branches_of
 from vegtool.console import table
+from vegtool.errors import UsageError
 from vegtool.formats import ReadOptions, read_plant
 from vegtool.plant import Branches, Material, Plant
 from vegtool.progress import Progress, silent
@@ -21,9 +22,15 @@ def inspect_plant(
     force: bool = False,
     progress: Progress = silent,
 ) -> dict[str, Any]:
-    """Read a model and describe it; write its branches where a file for them is named."""
+    """Read a model and describe it; write its branches where a file for them is named.
+
+    Raises UsageError where that file is none of its own: its name must end in .npz, so that
+    neither the model nor what lies beside it is ever overwritten.
+    """
     from vegtool.branches.table import write_branches
 
+    if branches_file is not None and branches_file.suffix.lower() != ".npz":
+        raise UsageError(f"--branches: expected a name that ends in .npz; got {branches_file}")
     plant = read_plant(path, read)
     branches = branches_of(plant, lambda stage, done: progress(stage, 0.3 + 0.7 * done))
     if branches_file is not None:
