@@ -341,6 +341,18 @@ def test_textures_that_do_not_repeat_are_noted_where_it_shows(
     assert any("clamped or mirrored" in note for note in plant.notes) == noted
 
 
+def test_a_texture_without_coordinates_is_left_out_and_noted(tmp_path: Path) -> None:
+    """Every face would show its first texel, here a transparent one: nothing at all."""
+    made = Gltf()
+    info = {"index": made.image(png(leaf_pixels()))}
+    leaf = made.material(pbrMetallicRoughness={"baseColorTexture": info}, alphaMode="MASK")
+    made.node(mesh=made.mesh(material=leaf))
+    plant = read_plant(made.write(tmp_path / "bare.glb"))
+    assert plant.materials[0].color_texture is None
+    assert plant.materials[0].alpha_mode == "opaque"
+    assert any("no texture coordinates" in note for note in plant.notes)
+
+
 def leaf_card(tmp_path: Path, image: bytes, factor: Any = (1, 1, 1, 1), **entry: Any) -> Plant:
     made = Gltf()
     surface = {

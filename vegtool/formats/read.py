@@ -67,7 +67,8 @@ def assemble(parsed: Parsed, path: Path, options: ReadOptions) -> Plant:
     mesh = _only_used_vertices(mesh)
     up = options.up if options.up != "auto" else parsed.up
     turn = UPRIGHT[up or guess_up(mesh.positions + mesh.origin, mesh.faces, notes)]
-    mesh, materials = _only_used_materials(mesh, parsed.materials)
+    materials = _without_lost_textures(parsed.materials, parsed.parts, notes)
+    mesh, materials = _only_used_materials(mesh, materials)
     plant = Plant(
         name=parsed.name,
         positions=turned(mesh.positions + mesh.origin, turn) * options.metres,
@@ -220,6 +221,23 @@ def _only_used_vertices(mesh: _Mesh) -> _Mesh:
         point=mesh.point[used],
         faces=(np.cumsum(used) - 1)[mesh.faces],
     )
+
+
+def _without_lost_textures(
+    materials: list[Material], parts: list[Part], notes: list[str]
+) -> list[Material]:
+    """The materials, plain where no face that wears them says where on the texture it lies."""
+    worn = {part.material for part in parts if len(part.faces)}
+    laid = {part.material for part in parts if part.uvs is not None}
+    found = list(materials)
+    for index in sorted(worn - laid):
+        material = found[index]
+        if material.color_texture is not None or material.normal_texture is not None:
+            notes.append(f"material {material.name}: no texture coordinates; drawn without texture")
+            found[index] = replace(
+                material, color_texture=None, normal_texture=None, alpha_mode="opaque"
+            )
+    return found
 
 
 def _only_used_materials(mesh: _Mesh, materials: list[Material]) -> tuple[_Mesh, list[Material]]:
