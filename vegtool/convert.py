@@ -8,10 +8,7 @@ the level's near end (DESIGN section 4, item 3).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import asdict, dataclass
-from time import perf_counter
 from typing import TYPE_CHECKING, cast, get_args
 
 from vegtool.arrays import IntArray
@@ -23,6 +20,7 @@ from vegtool.lod import Display, Level, LodChain
 from vegtool.options import check_limits, option
 from vegtool.plant import Plant
 from vegtool.progress import Progress, silent
+from vegtool.timing import timed
 
 if TYPE_CHECKING:
     from vegtool.baking.bake import PlantBuffers
@@ -177,13 +175,3 @@ def near_distance(plant: Plant, display: Display, level: int) -> float:
             f"{plant.source or plant.name}: expected a plant with an extent, found none"
         )
     return float(display.distance_m(NEAR_PIXELS / size) * 2**level)
-
-
-@contextmanager
-def timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
-    """Add the time of the block to `seconds[stage]`."""
-    start = perf_counter()
-    try:
-        yield
-    finally:
-        seconds[stage] = seconds.get(stage, 0.0) + perf_counter() - start
