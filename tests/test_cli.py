@@ -42,6 +42,17 @@ def test_convert_writes_levels_combined_manifest_and_sheet(model: Path, tmp_path
     }  # fmt: skip
 
 
+def test_the_manifest_holds_all_options_that_shaped_the_levels(model: Path, tmp_path: Path) -> None:
+    """How the file was understood, too: without it the same levels could not be made again."""
+    out = tmp_path / "out"
+    reading = ["--unit", "dm", "--leaf-material", "*twig*"]
+    assert run(["convert", str(model), "-o", str(out), *SMALL, *reading]) == 0
+    options = json.loads((out / "bush.lod.json").read_text())["options"]
+    assert (options["billboards"], options["levels"]) == (24, 2)
+    assert (options["unit"], options["up"]) == ("dm", "auto")
+    assert options["leaf_materials"] == ["*twig*"]
+
+
 def test_json_names_the_files(
     model: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

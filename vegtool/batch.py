@@ -11,7 +11,7 @@ import threading
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
@@ -125,7 +125,8 @@ def convert_file(job: Job, task: Task, progress: Progress = silent) -> Outcome:
     inputs = (job.source, *task.inputs)
     check_free(task.folder, names, task.force, inputs)
     chain = convert(plant, task.convert, lambda s, f: progress(s, 0.05 + 0.75 * f))
-    chain = replace(chain, name=job.name)
+    options = {**asdict(task.read), **chain.options}
+    chain = replace(chain, name=job.name, options=options)
     progress("contact sheet", 0.8)
     extra = {sheet_name: contact_sheet(chain)}
     progress("writing", 0.9)
