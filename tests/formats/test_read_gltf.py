@@ -648,6 +648,18 @@ def test_attribute_gives_branches(tmp_path: Path, with_parents: bool) -> None:
     assert any("parents were found" in n for n in plant.notes) is not with_parents
 
 
+def test_branches_without_wood_are_ignored(tmp_path: Path) -> None:
+    points, faces, branch = joined_tubes()
+    made = Gltf()
+    tags = {"_BRANCH": branch, "_BRANCH_PARENT": np.array([-1, 0, 0, 2])[branch]}
+    tags = {name: values.astype(np.float32) for name, values in tags.items()}
+    leaf, bark = made.material(name="leaf"), made.material(name="bark")
+    made.node(mesh=made.mesh(points, faces, leaf, **tags))
+    made.node(mesh=made.mesh(points, faces, bark))
+    plant = read_plant(made.write(tmp_path / "leaves.glb"))
+    assert plant.branches is None and any("without wood" in note for note in plant.notes)
+
+
 def test_branch_attribute_in_a_circle_is_ignored(tmp_path: Path) -> None:
     points, faces, branch = joined_tubes()
     circle = np.array([1, 0, 0, 2])[branch].astype(np.float32)

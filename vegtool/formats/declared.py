@@ -51,6 +51,9 @@ def resolve_branches(
             "the file names its branches; their parents were found by what surrounds their base"
         )
     face_branch, parent = _without_woodless(face_branch, parent, wood)
+    if not len(parent):
+        notes.append("the file's branches are without wood; ignored")
+        return None
     stated = declared.source == "attribute" and declared.parent is not None
     few = len(parent) < FEWEST or np.bincount(parent[parent >= 0], minlength=1).max() < 2
     if few and not stated:
