@@ -29,7 +29,7 @@ OPTIONAL_PACKAGES = {
 }
 
 OPTIONAL_PROGRAMS = {
-    "gltfpack": ("decompresses meshopt glTF, simplifies meshes", "npm install -g gltfpack"),
+    "gltfpack": ("decompresses meshopt glTF, which vegtool cannot", "npm install -g gltfpack"),
 }
 
 
