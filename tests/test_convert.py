@@ -9,8 +9,12 @@ import pytest
 
 from vegtool.convert import NEAR_PIXELS, ConvertOptions, billboard_counts, convert
 from vegtool.errors import UsageError
+from vegtool.gl.draw import Light
+from vegtool.gl.upload import PlantBuffers
 from vegtool.growth import sample
 from vegtool.lod import LodChain
+from vegtool.measure.pictures import client_plant, live, truth
+from vegtool.measure.views import direction, framed
 from vegtool.plant import Plant
 
 pytestmark = pytest.mark.gl
@@ -60,6 +64,30 @@ def test_no_level_costs_more_than_half_of_the_original() -> None:
     assert counts[0] * 2 <= len(herb.faces) / 2
     assert counts == sorted(counts, reverse=True)
     assert counts[-1] >= 1
+
+
+def test_every_level_covers_what_the_plant_covers_in_its_colour(
+    bush: Plant, chain: LodChain
+) -> None:
+    """As a client draws it, from all around and above, at the distance from which it is meant;
+    and double-sided leaves lit from everywhere keep their colour."""
+    everywhere = Light(sun=0.0, sky_above=1.0, sky_below=1.0)
+    for level in chain.levels[1:]:
+        ratios = []
+        for azimuth, elevation in ((25, 8), (115, 8), (205, 8), (295, 8), (0, 60)):
+            view = direction(azimuth, elevation)
+            camera = framed(bush.center, bush.radius, view, level.near_distance_m, chain.display)
+            with (
+                PlantBuffers(bush) as original,
+                PlantBuffers(client_plant(level), mipmaps=True) as baked,
+            ):
+                wanted = truth(original, camera, everywhere).sum(axis=(0, 1))
+                found = live(baked, camera, everywhere).sum(axis=(0, 1))
+            ratios.append(found / wanted)
+        color, cover = np.array(ratios)[:, :3], np.array(ratios)[:, 3]
+        assert cover.mean() == pytest.approx(1.0, abs=0.1)
+        assert cover == pytest.approx(1.0, abs=0.2)
+        assert color / cover[:, None] == pytest.approx(1.0, abs=0.1)
 
 
 @pytest.mark.parametrize("method", ["kmeans", "isodata", "branches"])
