@@ -303,6 +303,17 @@ def test_verbose_says_where_the_time_went(
     assert "clustering" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("more", [[], ["--dry-run"]])
+def test_a_file_in_place_of_the_folder_is_said_before_the_work(
+    more: list[str], model: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("the user's own")
+    folder = tmp_path / "file" / "out"
+    assert run(["convert", str(model), "-o", str(folder), *SMALL, *more]) == 1
+    assert "a file stands where its folder should be" in capsys.readouterr().err
+    assert (tmp_path / "file").read_text() == "the user's own"
+
+
 def test_levels_of_an_earlier_run_are_no_models(tmp_path: Path) -> None:
     for name in ("oak.glb", "oak_LOD1.glb", "oak_LOD2.glb", "oak.lod.json", "mine_LOD1.glb"):
         (tmp_path / name).touch()

@@ -76,7 +76,7 @@ def find_jobs(inputs: Sequence[Path]) -> list[Job]:
     """
     sources: list[Path] = []
     for path in inputs:
-        if path.is_dir():
+        if _is_folder(path):
             models = _models_in(path)
             if not models:
                 known = " ".join(READERS)
@@ -210,6 +210,13 @@ def _plant_of_level(name: str) -> str | None:
     """oak, where the name is that of a level of an oak: oak_LOD1."""
     found = re.fullmatch(r"(.+)_lod\d+", name, re.IGNORECASE | re.DOTALL)
     return found[1] if found else None
+
+
+def _is_folder(path: Path) -> bool:
+    try:
+        return path.is_dir()
+    except OSError:  # in a folder that may not be entered: reading it says so
+        return False
 
 
 def _models_in(folder: Path) -> list[Path]:

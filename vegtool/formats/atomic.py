@@ -12,7 +12,7 @@ import secrets
 import shutil
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from errno import EDQUOT, EEXIST, EFBIG, ENAMETOOLONG, ENOSPC, ENOTDIR
+from errno import EACCES, EDQUOT, EEXIST, EFBIG, ENAMETOOLONG, ENOSPC, ENOTDIR
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -117,6 +117,7 @@ def check_free(
     To be asked before long work, so that a refusal comes at once.
     """
     inputs = tuple(inputs)
+    _check_folder(folder)
     for path in (folder / name for name in names):
         if not os.path.lexists(path):
             continue
@@ -132,6 +133,16 @@ def check_free(
             raise OutputError(
                 f"{path}: exists already. Overwrite it with -f, or choose another folder with -o."
             )
+
+
+def _check_folder(folder: Path) -> None:
+    """Raise OutputError where the folder is not there and cannot be made, or not be written."""
+    there = next((p for p in (folder, *folder.parents) if os.path.lexists(p)), folder)
+    with _explained(folder):
+        if not there.is_dir():
+            raise NotADirectoryError(ENOTDIR, os.strerror(ENOTDIR))
+        if not os.access(there, os.W_OK | os.X_OK):
+            raise PermissionError(EACCES, os.strerror(EACCES))
 
 
 _ELSEWHERE = "Choose another folder with -o."
