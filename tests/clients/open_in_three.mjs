@@ -7,21 +7,10 @@
 //   or {file, error, complaints}. A silhouette is cells * cells bits, top row first, highest bit
 //   first: 1 where at least the share `cover` of the cell's pixels is drawn.
 // One browser and one page serve all jobs.
-import fs from 'node:fs';
-import http from 'node:http';
-import os from 'node:os';
-import path from 'node:path';
-import {folder, load, readInput} from './packages.mjs';
+import {inBrowser} from './browser.mjs';
+import {readInput} from './packages.mjs';
 
 const {cells, cover, views, jobs} = await readInput();
-const puppeteer = load('puppeteer-core');
-
-const page = `<!doctype html>
-<script type="importmap">
-  {"imports": {"three": "/packages/three/build/three.module.js",
-               "three/addons/": "/packages/three/examples/jsm/"}}
-</script>
-<script type="module" src="/page.js"></script>`;
 
 const script = `
 import * as THREE from 'three';
@@ -81,56 +70,17 @@ window.draw = async ({url, center, radius, pixels}) => {
 window.ready = true;
 `;
 
-const types = {'.js': 'text/javascript', '.html': 'text/html', '.glb': 'model/gltf-binary'};
-const server = http.createServer((request, response) => {
-  const url = decodeURIComponent(request.url.split('?')[0]);
-  const send = (type, body) => response.setHeader('content-type', type).end(body);
-  if (url === '/') return send('text/html', page);
-  if (url === '/favicon.ico') return response.writeHead(204).end();
-  if (url === '/page.js') return send('text/javascript', script);
-  const job = url.match(/^\/job\/(\d+)$/);
-  const file = job ? jobs[job[1]].file : path.join(folder, url.replace(/^\/packages\//, ''));
-  fs.readFile(file, (error, body) => {
-    if (error) return response.writeHead(404).end();
-    return send(types[path.extname(file)] || 'application/octet-stream', body);
-  });
-});
-await new Promise((done) => server.listen(0, '127.0.0.1', done));
-
-const profile = fs.mkdtempSync(path.join(os.tmpdir(), 'vegtool-chromium-'));
-const browser = await puppeteer.launch({
-  executablePath: process.env.VEGTOOL_CHROMIUM,
-  userDataDir: profile,
-  protocolTimeout: 300_000,
-  args: [
-    '--no-sandbox', '--no-first-run', '--disable-quic', '--disable-sync',
-    '--disable-background-networking', '--disable-component-update', '--disable-dev-shm-usage',
-    '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
-    '--ignore-gpu-blocklist',
-  ],
-});
-try {
-  const tab = await browser.newPage();
-  const complaints = [];
-  tab.on('pageerror', (error) => complaints.push(error.message));
-  tab.on('console', (line) => {
-    if (['error', 'warn'].includes(line.type())) complaints.push(line.text());
-  });
-  await tab.goto(`http://127.0.0.1:${server.address().port}/`);
-  await tab.waitForFunction('window.ready', {timeout: 60_000});
+const files = jobs.map((job) => job.file);
+await inBrowser(script, files, async (tab, complaints) => {
   for (const [index, {file, ...camera}] of jobs.entries()) {
     complaints.length = 0;
     try {
       const drawn = await tab.evaluate((job) => window.draw(job), {
-        url: `/job/${index}`, ...camera,
+        url: `/file/${index}`, ...camera,
       });
       console.log(JSON.stringify({file, ...drawn, complaints}));
     } catch (error) {
       console.log(JSON.stringify({file, error: error.message, complaints}));
     }
   }
-} finally {
-  await browser.close();
-  server.close();
-  fs.rmSync(profile, {recursive: true, force: true});
-}
+});

@@ -1,0 +1,61 @@
+// A page with three.js in headless Chromium, and files for it to load.
+import fs from 'node:fs';
+import http from 'node:http';
+import os from 'node:os';
+import path from 'node:path';
+import {folder, load} from './packages.mjs';
+
+const page = `<!doctype html>
+<script type="importmap">
+  {"imports": {"three": "/packages/three/build/three.module.js",
+               "three/addons/": "/packages/three/examples/jsm/"}}
+</script>
+<script type="module" src="/page.js"></script>`;
+const types = {'.js': 'text/javascript', '.html': 'text/html', '.glb': 'model/gltf-binary'};
+
+// Opens a page that runs `script` (a module that sets window.ready) and serves files[i] at
+// /file/i; calls work(tab, complaints), with what the page complains of, and closes everything.
+export async function inBrowser(script, files, work) {
+  const server = http.createServer((request, response) => {
+    const url = decodeURIComponent(request.url.split('?')[0]);
+    const send = (type, body) => response.setHeader('content-type', type).end(body);
+    if (url === '/') return send('text/html', page);
+    if (url === '/favicon.ico') return response.writeHead(204).end();
+    if (url === '/page.js') return send('text/javascript', script);
+    const index = url.match(/^\/file\/(\d+)$/);
+    const file = index ? files[index[1]] : path.join(folder, url.replace(/^\/packages\//, ''));
+    fs.readFile(file, (error, body) => {
+      if (error) return response.writeHead(404).end();
+      return send(types[path.extname(file)] || 'application/octet-stream', body);
+    });
+  });
+  await new Promise((done) => server.listen(0, '127.0.0.1', done));
+
+  const profile = fs.mkdtempSync(path.join(os.tmpdir(), 'vegtool-chromium-'));
+  const browser = await load('puppeteer-core').launch({
+    executablePath: process.env.VEGTOOL_CHROMIUM,
+    userDataDir: profile,
+    protocolTimeout: 600_000,
+    args: [
+      '--no-sandbox', '--no-first-run', '--disable-quic', '--disable-sync',
+      '--disable-background-networking', '--disable-component-update', '--disable-dev-shm-usage',
+      '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
+      '--ignore-gpu-blocklist',
+    ],
+  });
+  try {
+    const tab = await browser.newPage();
+    const complaints = [];
+    tab.on('pageerror', (error) => complaints.push(error.message));
+    tab.on('console', (line) => {
+      if (['error', 'warn'].includes(line.type())) complaints.push(line.text());
+    });
+    await tab.goto(`http://127.0.0.1:${server.address().port}/`);
+    await tab.waitForFunction('window.ready', {timeout: 60_000});
+    await work(tab, complaints);
+  } finally {
+    await browser.close();
+    server.close();
+    fs.rmSync(profile, {recursive: true, force: true});
+  }
+}
