@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import cache
 from platform import system
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import moderngl
 
@@ -37,6 +38,9 @@ class ContextInfo:
     version: str
     max_texture: int
     software: bool
+
+
+_described: WeakKeyDictionary[moderngl.Context, ContextInfo] = WeakKeyDictionary()
 
 
 @cache
@@ -74,9 +78,10 @@ def framebuffer_kept(ctx: moderngl.Context) -> Iterator[None]:
 def check(ctx: moderngl.Context) -> None:
     """Raise CapabilityError where OpenGL refused something since the last check.
 
-    It says nothing by itself and goes on, with a wrong picture.
+    It says nothing by itself and goes on, with a wrong picture. An enum that a driver does not
+    know is a matter of its version, and draws nothing wrong.
     """
-    if (error := ctx.error) != "GL_NO_ERROR":
+    if (error := ctx.error) not in ("GL_NO_ERROR", "GL_INVALID_ENUM"):
         raise CapabilityError(
             f"OpenGL refused to draw ({error}): the plant or its pictures are larger than "
             f"{describe(ctx).renderer} can hold. Use a plant of fewer triangles or smaller "
@@ -96,12 +101,17 @@ def remedy() -> str:
 
 def describe(ctx: moderngl.Context | None = None) -> ContextInfo:
     """Vendor, renderer, version and limits of `ctx`, by default of the shared context."""
-    info = (ctx or context()).info
-    renderer = str(info["GL_RENDERER"])
-    return ContextInfo(
-        vendor=str(info["GL_VENDOR"]),
-        renderer=renderer,
-        version=str(info["GL_VERSION"]),
-        max_texture=int(info["GL_MAX_TEXTURE_SIZE"]),
-        software=any(name in renderer.lower() for name in ("llvmpipe", "softpipe", "swiftshader")),
-    )
+    ctx = ctx or context()
+    if ctx not in _described:
+        info = ctx.info
+        renderer = str(info["GL_RENDERER"])
+        software = any(name in renderer.lower() for name in ("llvmpipe", "softpipe", "swiftshader"))
+        _described[ctx] = ContextInfo(
+            vendor=str(info["GL_VENDOR"]),
+            renderer=renderer,
+            version=str(info["GL_VERSION"]),
+            max_texture=int(info["GL_MAX_TEXTURE_SIZE"]),
+            software=software,
+        )
+        _ = ctx.error  # moderngl asks for more than every driver knows
+    return _described[ctx]
