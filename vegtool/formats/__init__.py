@@ -6,7 +6,6 @@ line in READERS. What each format's quirks become is written in docs/formats.md.
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -102,8 +101,12 @@ def read_plant(path: str | Path, options: ReadOptions = ReadOptions()) -> Plant:
 
 
 def _read(path: Path, options: ReadOptions) -> Plant:
-    if not os.path.lexists(path):
-        raise InputError(f"{path}: expected a model file, found nothing there; check the path")
+    try:
+        path.lstat()
+    except FileNotFoundError:
+        raise InputError(
+            f"{path}: expected a model file, found nothing there; check the path"
+        ) from None
     extension = path.suffix.lower()
     if extension in CONVERTERS:
         raise CapabilityError(
