@@ -15,7 +15,6 @@ the truth's). `--record` appends rows to benchmarks/results/quality.csv.
 from __future__ import annotations
 
 import argparse
-import csv
 import json
 import os
 import shlex
@@ -29,6 +28,7 @@ from typing import Any
 import flip_evaluator
 import numpy as np
 from PIL import Image
+from recorded import record
 
 from vegtool import __version__
 from vegtool.formats import read_plant
@@ -37,7 +37,6 @@ from vegtool.growth import sample
 
 ROOT = Path(__file__).resolve().parent.parent
 CLIENTS = ROOT / "tests" / "clients"
-RESULTS = ROOT / "benchmarks" / "results" / "quality.csv"
 SIZE, FOV, TRUTH = 256, 40, 8
 DISTANCES = (2.9, 5.8, 11.6)  # bounding radii
 VIEWS = 12
@@ -161,12 +160,7 @@ def main() -> None:
                 rows.append(row)
                 print("  ".join(f"{row[k]!s:>10}" for k in HEAD[1:]), flush=True)
     if known.record:
-        new = not RESULTS.exists()
-        with RESULTS.open("a", newline="") as file:
-            writer = csv.DictWriter(file, HEAD, lineterminator="\n")
-            if new:
-                writer.writeheader()
-            writer.writerows(rows)
+        record("quality", rows)
 
 
 if __name__ == "__main__":
