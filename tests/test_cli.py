@@ -223,9 +223,13 @@ main()
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no SIGINT to a process of one's own on Windows")
-@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM"])
-def test_an_interrupted_batch_ends_its_workers(model: Path, tmp_path: Path, number: str) -> None:
-    """The signal comes to the first process alone, once both workers have been started."""
+@pytest.mark.parametrize(
+    ("number", "after"), [("SIGINT", 0.5), ("SIGTERM", 0.5), ("SIGTERM", 0.001)]
+)
+def test_an_interrupted_batch_ends_its_workers(
+    model: Path, tmp_path: Path, number: str, after: float
+) -> None:
+    """The signal comes to the first process alone, while workers are started or at work."""
     folder, out = tmp_path / "in", tmp_path / "out"
     folder.mkdir()
     for name in "abcd":
@@ -237,8 +241,8 @@ submit, count = Pool.submit, 0
 def submit_and_kill(*arguments):
     global count
     count += 1
-    if count == 4:
-        signal.setitimer(signal.ITIMER_REAL, 0.5)
+    if count == (4 if {after} > 0.1 else 1):
+        signal.setitimer(signal.ITIMER_REAL, {after})
     return submit(*arguments)
 signal.signal(signal.SIGALRM, lambda *_: os.kill(os.getpid(), signal.{number}))
 if __name__ == "__main__":

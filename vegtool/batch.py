@@ -157,9 +157,9 @@ def convert_files(
     spawn = get_context("spawn")
     stop = spawn.Event()
     with ProcessPoolExecutor(min(workers, len(jobs)), spawn, _in_worker, (stop,)) as pool:
-        with _interrupts_ignored():
-            futures = [pool.submit(_outcome, job, task, _or_stop) for job in jobs]
         try:
+            with _uninterrupted():
+                futures = [pool.submit(_outcome, job, task, _or_stop) for job in jobs]
             for done, (job, future) in enumerate(zip(jobs, futures, strict=True), start=1):
                 try:
                     yield future.result()
@@ -194,16 +194,25 @@ def _or_stop(stage: str, fraction: float) -> None:
 
 
 @contextmanager
-def _interrupts_ignored() -> Iterator[None]:
-    """Processes started meanwhile begin deaf to Ctrl-C, which a terminal sends to all of them."""
+def _uninterrupted() -> Iterator[None]:
+    """Processes are started whole: one half-started would be waited for without end.
+
+    They begin deaf to Ctrl-C, which a terminal sends to all of them; other signals wait.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    came: list[int] = []
+    others = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    before = {number: signal.signal(number, lambda n, frame: came.append(n)) for number in others}
+    before[signal.SIGINT] = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler or signal.SIG_DFL)
+    for number in came:
+        signal.raise_signal(number)
 
 
 def _plant_of_level(name: str) -> str | None:
