@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -58,12 +59,34 @@ def test_the_original_comes_first_and_every_option_is_written_down(
     assert ConvertOptions(**chain.options) == OPTIONS
 
 
-def test_no_level_costs_more_than_half_of_the_original() -> None:
+def test_no_level_costs_more_than_half_of_the_one_before() -> None:
+    """Single-sided leaves need two quads a billboard: the first level would save too little."""
     herb = sample("herb", 400)
-    counts = billboard_counts(herb, ConvertOptions(billboards=1000, levels=3))
-    assert counts[0] * 2 <= len(herb.faces) / 2
-    assert counts == sorted(counts, reverse=True)
-    assert counts[-1] >= 1
+    for double_sided in (True, False):
+        materials = tuple(replace(m, double_sided=double_sided) for m in herb.materials)
+        plant = replace(herb, materials=materials)
+        triangles = [level.triangles for level in convert(plant, ConvertOptions()).levels]
+        assert all(2 * b <= a for a, b in pairwise(triangles))
+        assert len(triangles) > 1
+
+
+def test_a_single_triangle_still_gets_a_level(bush: Plant) -> None:
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    plant = Plant(
+        "triangle", corners, np.tile([0.0, 0, 1], (3, 1)), np.zeros((3, 2)), [[0, 1, 2]], [0],
+        bush.materials[:1],
+    )  # fmt: skip
+    chain = convert(plant, ConvertOptions(levels=6))
+    assert len(chain.levels) == 2
+    assert chain.levels[1].near_distance_m > 20 * plant.height, "the far one"
+
+
+def test_counts_fall_by_a_third() -> None:
+    herb = sample("herb", 400)
+    counts = billboard_counts(herb, ConvertOptions(billboards=1000, levels=7))
+    assert counts[0] == len(herb.faces) // 4
+    assert counts[1:3] == [round(counts[0] / 3), round(counts[0] / 9)]
+    assert counts[-1] == 1
 
 
 def test_every_level_covers_what_the_plant_covers_in_its_colour(

@@ -127,7 +127,8 @@ def convert_command(
         raise typer.Exit(failed[0].exit_code)
     if failed:
         names = ", ".join(str(o.job.source) for o in failed)
-        raise BatchError(f"{len(failed)} of {len(outcomes)} inputs failed: {names}")
+        kind = BatchError if len(failed) < len(outcomes) else VegtoolError
+        raise kind(f"{len(failed)} of {len(outcomes)} inputs failed: {names}")
 
 
 @app.command("inspect")

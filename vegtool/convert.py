@@ -32,8 +32,11 @@ NEAR_PIXELS = 200
 """Size of the plant on the screen (pixels, its longest side) where the first billboard level takes
 over from the geometry, until measuring states the distance: the atlas is made for it."""
 
-LEAST_FACES_PER_BILLBOARD = 4
-"""A billboard costs two triangles: a level must halve the original at least, or it is no level."""
+MOST_OF_PREVIOUS = 0.5
+"""A level has at most this share of the triangles of the one before it, or it is left out."""
+
+TRIANGLES_PER_BILLBOARD = 2
+"""At least: four where both sides have pictures of their own."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,10 @@ class ConvertOptions:
     """What shapes a chain of levels. The command line makes its flags from these fields."""
 
     method: str = option(
-        "branches", "How faces are grouped into clusters.", choices=tuple(METHODS), short="m"
+        "branches",
+        "What clusters are like. " + "; ".join(f"{k}: {v}" for k, (_, v) in METHODS.items()) + ".",
+        choices=tuple(METHODS),
+        short="m",
     )
     billboards: int = option(
         512,
@@ -90,7 +96,8 @@ def convert(
 ) -> LodChain:
     """Make the chain of levels of one plant.
 
-    levels[0] is the plant itself, the others are billboards. Raises UsageError for options out of
+    levels[0] is the plant itself, the others are billboards: one at least, and no more than save
+    triangles. Raises UsageError for options out of
     range and CapabilityError where nothing can draw.
     """
     from vegtool.baking.bake import PlantBuffers
@@ -105,7 +112,10 @@ def convert(
             def report(stage: str, fraction: float, index: int = index) -> None:
                 progress(f"LOD{index + 1}: {stage}", (index + fraction) / len(counts))
 
-            levels.append(billboard_level(buffers, options, index, count, report))
+            level = billboard_level(buffers, options, index, count, report)
+            saves = level.triangles <= MOST_OF_PREVIOUS * levels[-1].triangles
+            if saves or (index == len(counts) - 1 and len(levels) == 1):
+                levels.append(level)
     progress("levels", 1.0)
     return LodChain(plant.name, tuple(levels), options.display, options.seed, asdict(options))
 
@@ -161,10 +171,9 @@ def billboard_level(
 
 def billboard_counts(plant: Plant, options: ConvertOptions) -> list[int]:
     """Planes per level, finest first: a third each time, never more than the plant can use."""
-    most = max(1, len(plant.faces) // LEAST_FACES_PER_BILLBOARD)
-    first = min(options.billboards, most)
-    counts = [max(1, round(first / LEVEL_RATIO**i)) for i in range(options.levels)]
-    return counts
+    most = int(MOST_OF_PREVIOUS * len(plant.faces) / TRIANGLES_PER_BILLBOARD)
+    first = min(options.billboards, max(1, most))
+    return [max(1, round(first / LEVEL_RATIO**i)) for i in range(options.levels)]
 
 
 def near_distance(plant: Plant, display: Display, level: int) -> float:

@@ -1,6 +1,6 @@
 """Labels become oriented boxes, and boxes single or crossed billboards."""
 
-from vegtool.boxes.billboards import make_billboards, planes_per_cluster
+from vegtool.boxes.billboards import make_billboards
 from vegtool.boxes.box import Boxes
 from vegtool.boxes.budget import fit_budget
 from vegtool.boxes.error import geometric_error
@@ -16,5 +16,4 @@ __all__ = [
     "geometric_error",
     "make_billboards",
     "oriented_planes",
-    "planes_per_cluster",
 ]

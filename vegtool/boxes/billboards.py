@@ -19,7 +19,6 @@ from vegtool.boxes.options import BoxOptions
 from vegtool.boxes.planes import oriented_planes
 from vegtool.lod import Billboards
 from vegtool.plant import Plant
-from vegtool.progress import Progress, silent
 
 MIN_SIDE = 1e-3
 """Least half side of a billboard, as a fraction of its cluster's diagonal: never without texels."""
@@ -30,10 +29,7 @@ UP = np.array([0.0, 1.0, -1e-3])
 
 
 def make_billboards(
-    plant: Plant,
-    labels: IntArray,
-    options: BoxOptions | None = None,
-    progress: Progress = silent,
+    plant: Plant, labels: IntArray, options: BoxOptions | None = None
 ) -> Billboards:
     """The billboards of a clustering.
 
@@ -45,14 +41,10 @@ def make_billboards(
     """
     options = options or BoxOptions()
     count = int(labels.max()) + 1
-    progress("boxes", 0.0)
     boxes = cluster_boxes(plant, labels, count, options)
     shown = shown_shares(plant, labels, boxes)
     planes = planes_per_box(boxes, shown, options)
-    progress("boxes", 0.9)
-    billboards = cut_planes(plant, labels, boxes, planes, shown, options)
-    progress("boxes", 1.0)
-    return billboards
+    return cut_planes(plant, labels, boxes, planes, shown, options)
 
 
 def cluster_boxes(plant: Plant, labels: IntArray, count: int, options: BoxOptions) -> Boxes:
@@ -60,16 +52,6 @@ def cluster_boxes(plant: Plant, labels: IntArray, count: int, options: BoxOption
     if options.plane == "orientation":
         return oriented_planes(plant.corners, labels, count)
     return fit_boxes(plant.corners.reshape(-1, 3), np.repeat(labels, 3), count, options)
-
-
-def planes_per_cluster(
-    plant: Plant, labels: IntArray, options: BoxOptions | None = None
-) -> IntArray:
-    """(k,) int32: how many billboards each cluster takes, 0 where it has no faces."""
-    options = options or BoxOptions()
-    count = int(labels.max()) + 1
-    boxes = cluster_boxes(plant, labels, count, options)
-    return planes_per_box(boxes, shown_shares(plant, labels, boxes), options)
 
 
 def shown_shares(plant: Plant, labels: IntArray, boxes: Boxes) -> FloatArray:

@@ -37,10 +37,6 @@ class Groups:
         """(g, ...) sums of (n, ...)."""
         return np.asarray(np.add.reduceat(values, self.starts[:-1], axis=0))
 
-    def least(self, values: FloatArray) -> FloatArray:
-        """(g, ...) least of (n, ...)."""
-        return np.asarray(np.minimum.reduceat(values, self.starts[:-1], axis=0))
-
     def greatest(self, values: FloatArray) -> FloatArray:
         """(g, ...) greatest of (n, ...)."""
         return np.asarray(np.maximum.reduceat(values, self.starts[:-1], axis=0))

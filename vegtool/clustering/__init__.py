@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from vegtool.plant import Plant
 
 METHODS: dict[str, tuple[str, str]] = {
-    "kmeans": ("kmeans:kmeans", "compact clusters of close faces that face the same way"),
-    "isodata": ("isodata:isodata", "long and thin clusters, split and merged by size"),
-    "branches": ("branches:branches", "whole branches, then parts of the least compact ones"),
+    "branches": ("branches:branches", "along the branches, so that trunks stay whole"),
+    "isodata": ("isodata:isodata", "long and thin, split and merged by size"),
+    "kmeans": ("kmeans:kmeans", "compact"),
 }
-"""Name -> (module:function within this room, summary)."""
+"""Name -> (module:function within this room, what its clusters are like)."""
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ def branches(
     """(f,) int32 labels of at most `count` clusters, none across two branches if count allows."""
     from vegtool.branches import branches_of
 
-    known = plant.branches or branches_of(plant)
+    known = branches_of(plant)
     each = 1 if options.strict_level else PER_BRANCH
     level = covered_level(known, count // each)
     owner = known.ancestor_at(level)[known.face_branch].astype(np.int64)

@@ -122,8 +122,12 @@ def quads(plant: Plant, group: Labels | None = None) -> Labels:
     edges = corners - np.roll(corners, 1, axis=1)
     longest = np.einsum("fij,fij->fi", edges, edges).argmax(axis=1)
     rows = np.arange(len(corners))
-    middle = corners[rows, longest] + corners[rows, longest - 1]  # a + b equals b + a exactly
-    same = _same_rows((middle + 0.0).view(np.int64))  # + 0.0: no negative zero
+    a, b = corners[rows, longest], corners[rows, longest - 1]
+    along = b - a
+    ahead = along[rows, (along != 0).argmax(axis=1)] >= 0  # which end comes first must not matter
+    along = np.where(ahead[:, None], along, -along)
+    ends = np.concatenate([a + b, along], axis=1)  # a + b equals b + a exactly
+    same = _same_rows((ends + 0.0).view(np.int64))  # + 0.0: no negative zero
     first = np.full(same.max() + 1, len(rows))
     np.minimum.at(first, same, rows)
     leader = first[same]
