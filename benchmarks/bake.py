@@ -30,7 +30,7 @@ from vegtool.boxes import BoxOptions, make_billboards
 from vegtool.clustering import ClusterOptions, cluster
 from vegtool.formats import read_plant
 from vegtool.gl import pictures
-from vegtool.gl.context import describe
+from vegtool.gl.context import describe, framebuffer_kept
 from vegtool.gl.program import source
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Billboards
@@ -79,7 +79,14 @@ def bare_calls(
     size = (width, rows)
     frame = ctx.framebuffer([ctx.texture(size, 4)], ctx.depth_texture(size))
 
+    per_metre = SAMPLES * float(np.median(rect[:, 2] / (2 * boards.half_size[:, 0])))
+    coarse = buffers.texels_per_metre > pictures.MINIFIED * per_metre  # sampled as the bake does
+
     def calls() -> None:
+        with framebuffer_kept(ctx):
+            draw()
+
+    def draw() -> None:
         frame.use()
         ctx.front_face = "cw"
         for first in range(0, height * SAMPLES, rows):
@@ -90,7 +97,7 @@ def bare_calls(
                     continue
                 culling = 0 if group.material.double_sided else moderngl.CULL_FACE
                 ctx.enable_only(moderngl.DEPTH_TEST | culling)
-                buffers.use(group, shader, point_sampled=True)
+                buffers.use(group, shader, point_sampled=bool(coarse[group.number]))
                 frame.viewport = (x, y - first, w, h)
                 shader["matrix"].write(matrix)
                 array.render(moderngl.TRIANGLES)

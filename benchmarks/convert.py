@@ -37,11 +37,15 @@ HEAD = (
 )  # fmt: skip
 
 MEASURED = """
-import resource, sys, time
+import pathlib, resource, sys
 from vegtool.cli import run
 code = run(sys.argv[1:])
-peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-print("PEAK", peak // (1024 * 1024 if sys.platform == "darwin" else 1024))
+status = pathlib.Path("/proc/self/status")
+if status.exists():  # Linux counts the parent's memory in ru_maxrss
+    peak = int(status.read_text().split("VmHWM:")[1].split()[0]) // 1024
+else:
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024**2
+print("PEAK", peak)
 sys.exit(code)
 """
 

@@ -14,9 +14,10 @@ layout(location = 1) out vec4 out_normal;
 
 void main() {
     vec3 color = surface_color(v_uv, v_color);
-    vec3 normal = normalize(v_normal);
 #ifdef NORMAL_MAP
-    normal = mapped_normal(normal, v_position * vec3(1.0, 1.0, side), v_uv);
+    vec3 normal = mapped_normal(normalize(v_normal), v_position * vec3(1.0, 1.0, side), v_uv);
+#else
+    vec3 normal = v_normal;
 #endif
     if (!gl_FrontFacing) normal = -normal;  // glTF: a back face's normal is reversed
     // Shading normals may still point away. The horizon is the nearest that a normal map can say.
