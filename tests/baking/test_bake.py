@@ -155,6 +155,26 @@ def test_sides_that_agree_share_their_picture_in_an_opposite_level():
     assert (baked.atlas.front[1] == baked.atlas.back[1]).all()
 
 
+def test_a_leaf_whose_normal_leans_needs_a_picture_of_its_own_behind():
+    """Behind, its normal turns round whole; a shared picture would keep its lean along the plane.
+    The sides of closed wood keep theirs, and share."""
+    board, opposite = billboards([[0, 0, 0]], 1.0), BakeOptions(sides="opposite")
+    leaf = quads([[0, 0, 0]], normal=(0.6, 0, 0.8), materials=(plain(),))
+    leaf = replace(leaf, materials=(replace(leaf.materials[0], double_sided=True),))
+    atlas = bake(leaf, ZERO, board, 4.0, opposite).atlas
+    assert (atlas.front != atlas.back).any()
+    front, back = (cut(atlas, 0, side)[1].mean(axis=(0, 1)) - 127.5 for side in ("front", "back"))
+    assert front[0] > 50 > -50 > back[0]
+
+    wood = quads([[0, 0, 0], [0, 0, -0.5]], materials=(plain(double_sided=True),))
+    leaning = np.repeat([[0.6, 0, 0.8], [0.6, 0, -0.8]], 4, axis=0)
+    faces = np.concatenate([wood.faces[:2], wood.faces[2:, ::-1]])  # the far side looks away
+    wood = replace(wood, normals=leaning, faces=faces)
+    labels = np.zeros(4, dtype=np.int32)
+    atlas = bake(wood, labels, board, 4.0, opposite).atlas
+    assert (atlas.front == atlas.back).all()
+
+
 def test_normals_are_turned_to_the_viewer_and_stay_in_the_upper_half():
     """Seen from behind, glTF reverses the normal; one that then points away goes to the horizon."""
     rng = np.random.default_rng(0)

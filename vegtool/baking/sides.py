@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vegtool.arrays import FloatArray, IntArray
+from vegtool.arrays import ByteArray, FloatArray, IntArray
 from vegtool.gl.pictures import Pictures, draw_pictures
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Billboards
@@ -36,18 +36,26 @@ class Sides:
 
     front, back: (p,) covered share of the rectangle. coverage: (p,) samples covered on one side
     alone, as a share of those covered on either. color: (p,) root mean square distance of the
-    sides' mean colours, sRGB from 0 to 1; 0 where a side is empty.
+    sides' mean colours, sRGB from 0 to 1; 0 where a side is empty. mirrored: (p,) bool, whether
+    normals behind lean along the plane as those in front do (closed wood), not the other way
+    (leaves, whose normals turn round whole).
     """
 
     front: FloatArray
     back: FloatArray
     coverage: FloatArray
     color: FloatArray
+    mirrored: np.ndarray
 
     @property
     def differ(self) -> np.ndarray:
-        """(p,) bool: one picture does not serve both sides of these."""
-        return np.asarray((self.coverage > COVERAGE_LIMIT) | (self.color > COLOR_LIMIT))
+        """(p,) bool: one picture does not serve both of two opposite quads.
+
+        They mirror a picture that they share: its u and v stay, its normal side turns.
+        """
+        return np.asarray(
+            (self.coverage > COVERAGE_LIMIT) | (self.color > COLOR_LIMIT) | ~self.mirrored
+        )
 
 
 def compare_sides(
@@ -70,8 +78,13 @@ def compare_sides(
         (CELLS_PER_ROW * CELL, rows * CELL),
         SAMPLES,
     )
-    cells = drawn.color.reshape(rows, CELL, CELLS_PER_ROW, CELL, 4).swapaxes(1, 2)
-    texels = cells.reshape(-1, CELL * CELL, 4)[: 2 * count] / 255.0
+
+    def texels_of(image: ByteArray) -> FloatArray:
+        cells = image.reshape(rows, CELL, CELLS_PER_ROW, CELL, -1).swapaxes(1, 2)
+        return np.asarray(cells.reshape(len(cells) * CELLS_PER_ROW, CELL * CELL, -1)[: 2 * count])
+
+    texels = texels_of(drawn.color) / 255.0
+    leaning = texels_of(drawn.normal)[..., :2] / 127.5 - 1.0
     alpha = texels[..., 3]
     front, back = alpha[:count], alpha[count:]
     either = np.maximum(front, back).sum(axis=1)
@@ -83,6 +96,7 @@ def compare_sides(
         back.mean(axis=1),
         np.abs(front - back).sum(axis=1) / np.maximum(either, 1e-9),
         np.where((total[:count] > 0) & (total[count:] > 0), color, 0.0),
+        np.einsum("ptc,ptc,pt->p", leaning[:count], leaning[count:], front * back) >= 0,
     )
 
 
