@@ -31,7 +31,9 @@ def portrait(plant: Plant) -> np.ndarray:
     offset = plant.positions - plant.center
     half = 1.06 * np.abs(np.stack([offset @ right, offset @ np.cross(towards, right)])).max()
     distance = half / np.tan(np.radians(FOV) / 2) + 0.5 * plant.radius
-    camera = Camera(plant.center, towards, distance, FOV, CELL, CELL, 1.5 * plant.radius)
+    focal = CELL / (2 * np.tan(np.radians(FOV) / 2))
+    middle = (CELL / 2, CELL / 2)
+    camera = Camera(plant.center, towards, distance, focal, CELL, CELL, middle, 1.5 * plant.radius)
     with PlantBuffers(plant) as buffers:
         return over(truth(buffers, camera, SUN), SKY)
 

@@ -33,8 +33,8 @@ def square(material: Material, offset: float = 0.0) -> Plant:
 
 def front(offset: float = 0.0, back: bool = False) -> Camera:
     """Sees two metres of height in 64 pixels."""
-    fov = 2 * np.degrees(np.arctan(1 / 10))
-    return Camera(np.full(3, offset), direction(180.0 * back, 0), 10.0, fov, 64, 64, 2.0)
+    to_eye = direction(180.0 * back, 0)
+    return Camera(np.full(3, offset), to_eye, 10.0, 320.0, 64, 64, (32.0, 32.0), 2.0)
 
 
 def test_a_square_covers_a_quarter_of_the_frame_in_its_own_colour() -> None:
