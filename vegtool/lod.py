@@ -116,6 +116,31 @@ class Atlas:
         return int(self.color.shape[0] * self.color.shape[1])
 
 
+@dataclass(frozen=True)
+class Spread:
+    """A figure over several views: its mean, standard deviation, least and greatest value."""
+
+    mean: float
+    sd: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Measured:
+    """How wrong a level is from where it may be used on, over a set of views.
+
+    pixels: size of the plant's longest extent there. kind, count: the views (measure/views.py).
+    errors: by metric (measure/metrics.py). live: the same of the original as a client draws it.
+    """
+
+    pixels: float
+    kind: str
+    count: int
+    errors: dict[str, Spread]
+    live: dict[str, Spread]
+
+
 @dataclass(frozen=True, eq=False)
 class Level:
     """One level of detail: a mesh (a Plant), or billboards with their atlas.
@@ -124,6 +149,7 @@ class Level:
     the normal on the back). Else two opposite single-sided quads, each with its own picture.
     texels_per_metre: density of the atlas. near_distance_m: from here on the level may be used.
     geometric_error_m: (maximum, 95th percentile) of DESIGN section 7, or None if not computed.
+    measured: its errors at near_distance_m, or None where they were not measured.
     seconds: how long each stage of making it took.
     """
 
@@ -135,6 +161,7 @@ class Level:
     texels_per_metre: float = 0.0
     near_distance_m: float = 0.0
     geometric_error_m: tuple[float, float] | None = None
+    measured: Measured | None = None
     seconds: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

@@ -148,7 +148,7 @@ def views(kind: str, count: int, phase: float = 0.0) -> tuple[View, ...]:
         raise UsageError(f"--views: expected one of {', '.join(ELEVATIONS)}; got {kind}")
     if count < 1:
         raise UsageError(f"--view-count: expected at least one view; got {count}")
-    i = np.arange(count)
+    i = np.arange(count, dtype=np.float64)
     low, high = (sin(radians(e)) for e in ELEVATIONS[kind])
     y = low + (high - low) * (i + (0.5 + phase) % 1) / count
     directions = _unit(y, i * _GOLDEN + phase)

@@ -1,0 +1,171 @@
+"""A level beside its truth: every metric from every view, at every size on the screen.
+
+The truth of a view is drawn once and shared by all that is scored against it. Pictures are drawn
+one after another, and scored beside that in a few threads.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from itertools import product
+from typing import TypeVar
+
+import numpy as np
+
+from vegtool.arrays import FloatArray
+from vegtool.errors import UsageError
+from vegtool.gl.draw import Light, Picture
+from vegtool.gl.upload import PlantBuffers
+from vegtool.lod import Display, Level, Spread
+from vegtool.measure.metrics import METRICS, Reference, reference, score
+from vegtool.measure.pictures import client_plant, live, truth
+from vegtool.measure.views import CLOSEST, Camera, View, around
+from vegtool.plant import Plant
+from vegtool.progress import Progress, silent
+
+LADDER = (400.0, 200.0, 100.0, 50.0, 25.0)
+"""Sizes of the plant's longest extent on the screen, in pixels, at which errors are measured."""
+THREADS = min(4, os.cpu_count() or 1)
+"""Pictures scored at a time."""
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True, eq=False)
+class Truths:
+    """What a plant really looks like, from each of the views v at each of the distances d.
+
+    pixels, distance_m: (d,) sizes on the screen and the distances that give them on `display`.
+    cameras, references: [d][v].
+    """
+
+    plant: Plant
+    display: Display
+    views: tuple[View, ...]
+    pixels: FloatArray
+    distance_m: FloatArray
+    cameras: tuple[tuple[Camera, ...], ...]
+    references: tuple[tuple[Reference, ...], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Scores:
+    """What was measured of a level. values: by metric, (d, v) for distances and views."""
+
+    pixels: FloatArray
+    distance_m: FloatArray
+    values: dict[str, FloatArray]
+
+    def spread(self, metric: str, row: int) -> Spread:
+        """A metric at one distance, over the views."""
+        return spread(self.values[metric][row])
+
+
+def truths(
+    plant: Plant,
+    views: Sequence[View],
+    pixels: Sequence[float] = LADDER,
+    display: Display | None = None,
+    progress: Progress = silent,
+    buffers: PlantBuffers | None = None,
+) -> Truths:
+    """Draw the truth of each view at each size, 8 x 8 samples to the pixel.
+
+    pixels: sizes on the screen, any order; kept in descending order. Sizes at which a display of
+    so wide an angle would have to stand within the plant are left out; UsageError where none is
+    left. buffers: the plant's, without mipmaps, where there are some.
+    """
+    display = display or Display()
+    extent = float((plant.bounds[1] - plant.bounds[0]).max())
+    if not extent > 0:
+        raise UsageError(f"{plant.source or plant.name}: expected a plant with an extent")
+    sizes = np.array(sorted(set(pixels), reverse=True), dtype=np.float64)
+    distances = np.array([display.distance_m(size / extent) for size in sizes])
+    seen = distances > CLOSEST * plant.radius
+    if not seen.any():
+        raise UsageError(
+            f"--fov {display.fov_y_deg:g}: at no size from {sizes[0]:g} to {sizes[-1]:g} pixels is "
+            "the eye outside the plant; use a narrower field of view or a larger --image-height"
+        )
+    sizes, distances = sizes[seen], distances[seen]
+    cameras = tuple(
+        tuple(around(plant.positions, view.direction, distance, display) for view in views)
+        for distance in distances
+    )
+
+    def pictures(draw_from: PlantBuffers) -> list[Reference]:
+        def draw(row: int, column: int) -> Picture:
+            light = Light(direction=views[column].sun)
+            return truth(draw_from, cameras[row][column], light)
+
+        return _drawn_and(reference_of, draw, (len(sizes), len(views)), "truth", progress)
+
+    def reference_of(row: int, column: int, picture: Picture) -> Reference:
+        return reference(picture)
+
+    if buffers is None:
+        with PlantBuffers(plant) as own:
+            found = pictures(own)
+    else:
+        found = pictures(buffers)
+    rows = tuple(tuple(found[i * len(views) : (i + 1) * len(views)]) for i in range(len(sizes)))
+    return Truths(plant, display, tuple(views), sizes, distances, cameras, rows)
+
+
+def scores(
+    truths: Truths, level: Level | Callable[[View], Level], progress: Progress = silent
+) -> Scores:
+    """Draw a level live (measure/pictures.py) from every camera of the truths, and score it.
+
+    level: or a function that gives the level for a view, for those that depend on it.
+    """
+    shape = len(truths.pixels), len(truths.views)
+    uploaded: dict[Level, PlantBuffers] = {}
+
+    def buffers_for(view: View) -> PlantBuffers:
+        shown = level if isinstance(level, Level) else level(view)
+        if shown not in uploaded:
+            uploaded[shown] = PlantBuffers(client_plant(shown), mipmaps=True)
+        return uploaded[shown]
+
+    def draw(row: int, column: int) -> Picture:
+        view = truths.views[column]
+        return live(buffers_for(view), truths.cameras[row][column], Light(direction=view.sun))
+
+    def scored(row: int, column: int, picture: Picture) -> dict[str, float]:
+        return score(truths.references[row][column], picture)
+
+    try:
+        found = _drawn_and(scored, draw, shape, "measuring", progress)
+    finally:
+        for buffers in uploaded.values():
+            buffers.release()
+    values = {name: np.array([f[name] for f in found]).reshape(shape) for name in METRICS}
+    return Scores(truths.pixels, truths.distance_m, values)
+
+
+def spread(values: FloatArray) -> Spread:
+    """Mean, standard deviation, least and greatest of (n,) values."""
+    low, high = float(values.min()), float(values.max())
+    return Spread(float(values.mean()), float(values.std()), low, high)
+
+
+def _drawn_and(
+    process: Callable[[int, int, Picture], Result],
+    draw: Callable[[int, int], Picture],
+    shape: tuple[int, int],
+    stage: str,
+    progress: Progress,
+) -> list[Result]:
+    """`process` of every picture, row by row; drawn here, processed in threads meanwhile."""
+    waiting: list[Future[Result]] = []
+    places = list(product(range(shape[0]), range(shape[1])))
+    with ThreadPoolExecutor(THREADS) as pool:
+        for done, (row, column) in enumerate(places):
+            progress(stage, done / len(places))
+            if done >= 2 * THREADS:  # no more pictures in memory than are worked on
+                waiting[done - 2 * THREADS].result()
+            waiting.append(pool.submit(process, row, column, draw(row, column)))
+        return [future.result() for future in waiting]
