@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from vegtool.convert import NEAR_PIXELS, ConvertOptions, billboard_counts, convert
+from vegtool.convert import ConvertOptions, billboard_counts, convert, near_pixels
 from vegtool.errors import UsageError
 from vegtool.gl.draw import Light
 from vegtool.gl.upload import PlantBuffers
@@ -38,17 +38,26 @@ def test_a_third_of_the_billboards_at_twice_the_distance(chain: LodChain) -> Non
         assert level.billboards is not None
         assert 0 < len(level.billboards) <= most
     near = [level.near_distance_m for level in levels]
-    assert near[1] == 2 * near[0]
-    assert near[2] == 4 * near[0]
+    assert near[1] == pytest.approx(2 * near[0])
+    assert near[2] >= near[1]
+
+
+def test_fewer_billboards_are_made_for_smaller_sizes() -> None:
+    assert near_pixels(512) == 200
+    assert near_pixels(512 * 3) == pytest.approx(400)
+    assert near_pixels(512 // 9) == pytest.approx(50, rel=0.02)
+    sizes = [near_pixels(count) for count in range(1, 100_000, 77)]
+    assert all(a <= b for a, b in pairwise(sizes))
+    assert sizes[0] >= 16, "a picture needs some texels"
+    assert sizes[-1] <= 1080, "no plant need be larger than the screen"
 
 
 def test_one_texel_per_pixel_at_the_near_end(chain: LodChain, bush: Plant) -> None:
     level = chain.levels[1]
     size = np.ptp(bush.bounds, axis=0).max()
-    assert size * chain.display.pixels_per_metre(level.near_distance_m) == pytest.approx(
-        NEAR_PIXELS
-    )
-    assert level.texels_per_metre == pytest.approx(NEAR_PIXELS / size)
+    density = chain.display.pixels_per_metre(level.near_distance_m)
+    assert size * density == pytest.approx(near_pixels(OPTIONS.billboards))
+    assert level.texels_per_metre == pytest.approx(density)
 
 
 def test_the_original_comes_first_and_every_option_is_written_down(

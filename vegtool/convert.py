@@ -3,12 +3,13 @@
 After Colditz et al. 2005, section 2: clusters of the plant's faces, a box around each, one to three
 billboards per box, textures baked from the faces. Every billboard level is for twice the distance
 of the one before, with about a third of its billboards, and its atlas holds one texel per pixel at
-the level's near end (DESIGN section 4, item 3).
+the level's near end.
 """
 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from math import log
 from typing import TYPE_CHECKING, cast, get_args
 
 from vegtool.arrays import IntArray
@@ -28,9 +29,12 @@ if TYPE_CHECKING:
 LEVEL_RATIO = 3
 """Each level has about a third of the billboards of the one before."""
 
-NEAR_PIXELS = 200
-"""Size of the plant on the screen (pixels, its longest side) where the first billboard level takes
-over from the geometry, until measuring states the distance: the atlas is made for it."""
+NEAR_PIXELS = (200.0, 512)
+"""Size of a plant on the screen (pixels, its longest side) that so many billboards are made for."""
+
+NEAR_LIMITS = (16.0, 1024.0)
+"""Pixels. Below, even one billboard's picture has too few texels to be one; above, a plant is as
+large as the screen."""
 
 MOST_OF_PREVIOUS = 0.5
 """A level has at most this share of the triangles of the one before it, or it is left out."""
@@ -112,7 +116,8 @@ def convert(
             def report(stage: str, fraction: float, index: int = index) -> None:
                 progress(f"LOD{index + 1}: {stage}", (index + fraction) / len(counts))
 
-            level = billboard_level(buffers, options, index, count, report)
+            near = distance_of(plant, options.display, near_pixels(count))
+            level = billboard_level(buffers, options, count, near, report)
             saves = level.triangles <= MOST_OF_PREVIOUS * levels[-1].triangles
             if saves or (index == len(counts) - 1 and len(levels) == 1):
                 levels.append(level)
@@ -123,11 +128,11 @@ def convert(
 def billboard_level(
     buffers: PlantBuffers,
     options: ConvertOptions,
-    index: int,
     count: int,
+    near_m: float,
     progress: Progress = silent,
 ) -> Level:
-    """One level of at most `count` billboards; `index` 0 is the finest, for the near distance."""
+    """One level of at most `count` billboards, its atlas made for a distance of `near_m` metres."""
     from vegtool.baking.bake import bake
     from vegtool.boxes import fit_budget, geometric_error
     from vegtool.clustering import cluster
@@ -148,12 +153,11 @@ def billboard_level(
         labels, billboards = fit_budget(plant, clusters, count, box_options)
         error = geometric_error(plant, labels, billboards)
     seconds["boxes"] -= seconds["clustering"]
-    near = near_distance(plant, options.display, index)
     baked = bake(
         buffers,
         labels,
         billboards,
-        options.display.pixels_per_metre(near),
+        options.display.pixels_per_metre(near_m),
         BakeOptions(max_texture=options.max_texture),
         lambda stage, fraction: progress(stage, 0.4 + 0.6 * fraction),
     )
@@ -163,7 +167,7 @@ def billboard_level(
         atlas=baked.atlas,
         double_sided=baked.double_sided,
         texels_per_metre=baked.texels_per_metre,
-        near_distance_m=near,
+        near_distance_m=near_m,
         geometric_error_m=error,
         seconds={**seconds, **baked.seconds},
     )
@@ -176,11 +180,24 @@ def billboard_counts(plant: Plant, options: ConvertOptions) -> list[int]:
     return [max(1, round(first / LEVEL_RATIO**i)) for i in range(options.levels)]
 
 
-def near_distance(plant: Plant, display: Display, level: int) -> float:
-    """Metres from which billboard level `level` (0 the finest) may be used."""
+def near_pixels(count: int) -> float:
+    """Size on the screen (pixels, the plant's longest side) that `count` billboards are made for.
+
+    A third of the billboards are for half the size, until measuring states the distance.
+    """
+    pixels, billboards = NEAR_PIXELS
+    size = pixels * (count / billboards) ** (log(2) / log(LEVEL_RATIO))
+    return min(max(size, NEAR_LIMITS[0]), NEAR_LIMITS[1])
+
+
+def distance_of(plant: Plant, display: Display, pixels: float) -> float:
+    """Metres from which the plant's longest side covers that many pixels.
+
+    Raises UsageError for a plant without extent.
+    """
     size = float((plant.bounds[1] - plant.bounds[0]).max())
     if size <= 0:
         raise UsageError(
             f"{plant.source or plant.name}: expected a plant with an extent, found none"
         )
-    return float(display.distance_m(NEAR_PIXELS / size) * 2**level)
+    return display.distance_m(pixels / size)
