@@ -27,8 +27,16 @@ MAY_IMPORT: dict[str, set[str]] = {
     "gl": set(),
     "baking": {"gl"},
     "measure": {"gl"},
-    "convert": {"clustering", "boxes", "baking"},
+    "baselines": {"formats", "boxes", "baking", "gl", "measure"},
+    "convert": {"clustering", "boxes", "baking", "measure"},
     "batch": {"convert", "formats", "measure"},
+    "stability": {
+        "branches", "clustering", "boxes", "gl", "baking", "measure", "convert", "growth",
+    },
+    "report": {
+        "formats", "clustering", "gl", "baking", "boxes", "measure", "baselines", "convert",
+        "stability",
+    },
     "inspect": {"branches", "formats", "console"},
     "doctor": {"measure"},
     "console": set(),
@@ -36,10 +44,14 @@ MAY_IMPORT: dict[str, set[str]] = {
     "__main__": {"cli"},
     "cli": {
         "batch", "console", "convert", "doctor", "flags", "formats", "growth", "inspect",
+        "measure", "report", "stability",
     },
 }  # fmt: skip
 
-HEAVY = ("moderngl", "trimesh", "sklearn", "scipy", "PIL", "skimage", "numba", "pyrender")
+HEAVY = (
+    "moderngl", "trimesh", "sklearn", "scipy", "PIL", "skimage", "matplotlib", "fast_simplification",
+    "numba", "pyrender",
+)  # fmt: skip
 
 
 def modules() -> list[Path]:
