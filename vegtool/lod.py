@@ -18,6 +18,10 @@ from vegtool.plant import Plant
 
 Kind = Literal["mesh", "billboards"]
 
+FADE_FRACTION = 0.15
+"""Of its switch distance: beyond it the level before is still drawn, fading out or, for a viewer
+that does not fade, until the eye has surely come to stay."""
+
 
 @dataclass(frozen=True)
 class Display:
@@ -132,6 +136,8 @@ class Measured:
 
     pixels: size of the plant's longest extent there. kind, count: the views (measure/views.py).
     errors: by metric (measure/metrics.py). live: the same of the original as a client draws it.
+    held_out: FLIP from as many views, under suns, that were not used to choose the distance; or
+    None where that was not asked for.
     """
 
     pixels: float
@@ -139,6 +145,7 @@ class Measured:
     count: int
     errors: dict[str, Spread]
     live: dict[str, Spread]
+    held_out: Spread | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,6 +204,7 @@ class LodChain:
     """All levels of a plant: levels[0] is the original, then coarser and coarser.
 
     options: everything that shaped the result, as plain values, for the manifest.
+    notes: sentences for the user: levels that were left out, and why.
     """
 
     name: str
@@ -204,6 +212,7 @@ class LodChain:
     display: Display
     seed: int
     options: dict[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
