@@ -31,7 +31,7 @@ _HALVINGS = 200
 def projection_error(billboards: Billboards, camera: Camera) -> FloatArray:
     """(p,) pixels, e_p of eq. 4: the half depth, seen across, at the distance of the middle.
 
-    Not a bound. Infinite where the middle is not in front of the eye.
+    Not a bound. Infinite behind the eye, unless it is 0.
     """
     middle = _points_seen(billboards.center, camera)
     normal = _vectors_seen(billboards.normal, camera)
