@@ -26,10 +26,13 @@ def reference(plant: Plant, weight: float, count: int) -> np.ndarray:
 @pytest.mark.parametrize("weight", [0.0, 0.12])
 @pytest.mark.parametrize("count", [3, 40, 300])
 def test_error_is_no_worse_than_scikit_learns(count: int, weight: float) -> None:
-    plant = plant_of(cards(1_000))
-    ours = cluster(plant, "kmeans", count, ClusterOptions(weight))
-    theirs = inertia(plant, reference(plant, weight, count), weight, count)
-    assert inertia(plant, ours, weight, count) <= 1.03 * theirs
+    """On average over plants: on one, either start may be the luckier by 5 %."""
+    ratios = []
+    for plant in (plant_of(cards(1_000, seed)) for seed in range(4)):
+        ours = cluster(plant, "kmeans", count, ClusterOptions(weight))
+        theirs = inertia(plant, reference(plant, weight, count), weight, count)
+        ratios.append(inertia(plant, ours, weight, count) / theirs)
+    assert np.mean(ratios) <= 1.03
 
 
 def test_error_is_no_worse_through_the_grid() -> None:

@@ -3,6 +3,8 @@
 A face is nine numbers: its centroid, and the tensor n n^T of its normal (which does not tell front
 from back). Off-diagonals are scaled by sqrt 2, so that Euclidean distance is Frobenius distance.
 Positions are in plant radii from the centre; `ClusterOptions.orientation_scale` scales the tensor.
+All nine lie in the plant's own frame (`frame`), so that a cut across an axis, or a cell of a grid,
+is the same one however the plant is turned.
 
 Points stand for one or more faces, so that the cost of clustering does not grow with the plant:
 the halves of a quad are one *piece* (which also keeps a leaf card on one billboard), equal faces
@@ -21,6 +23,8 @@ from vegtool.arrays import FloatArray, unit
 from vegtool.plant import Plant
 
 SAME = 1e-9  # plant radii: features closer than this, per axis, are the same
+TIED = 1e-6  # of the largest: variances, third moments, squared edges this close are equal
+FAR = 0.618  # of the farthest point's distance
 PARALLEL = 0.99  # cosine: halves of a quad may be bent by 8 degrees
 LIGHTEST = 1e-6  # of the mean face: the weight of faces without area
 CELLS = 1 << 14  # points that clustering works on
@@ -44,22 +48,65 @@ class Samples:
 
 
 def face_features(plant: Plant, orientation_scale: float) -> FloatArray:
-    """(f, 9) plant radii: centroid and scaled normal tensor of every face; see the module."""
+    """(f, 9) plant radii: centroid and scaled normal tensor of every face; see the module.
+
+    Center and radius are those of the plant's bounds in its own frame. Features are multiples of
+    SAME, so that rounding does not decide between points that are equally near.
+    """
     scale = plant.radius or 1.0
-    position = (plant.corners - plant.center).mean(axis=1) / scale
-    x, y, z = unit(plant.face_area_vectors / scale**2).T
+    corners = (plant.corners - plant.center) / scale
+    axes = frame(corners.mean(axis=1), face_weights(plant))
+    corners = np.einsum("fci,ai->fca", corners, axes)
+    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+    radius = float(np.linalg.norm(high - low)) / 2
+    position = (corners.mean(axis=1) - (low + high) / 2) / (radius or 1.0)
+    x, y, z = np.einsum("fi,ai->af", unit(plant.face_area_vectors / scale**2), axes)
     root2 = sqrt(2)
     tensor = np.stack([x * x, y * y, z * z, root2 * x * y, root2 * x * z, root2 * y * z], axis=1)
-    return np.concatenate([position, orientation_scale * tensor], axis=1)
+    features = np.concatenate([position, orientation_scale * tensor], axis=1)
+    return np.asarray(np.round(features / SAME) * SAME)
+
+
+def frame(points: FloatArray, weights: FloatArray) -> FloatArray:
+    """(3, 3) rows: principal axes of weighted points (n, 3), longest first, right-handed.
+
+    Turned points give turned axes. The first two point to the side to which the points are skewed.
+    Where points are skewed to neither side, or spread alike along several axes, the first point
+    that lies FAR off decides.
+    """
+    offset = points - (weights[:, None] * points).sum(axis=0)
+    values, vectors = np.linalg.eigh(np.einsum("n,ni,nj->ij", weights, offset, offset))
+    values, axes = values[::-1], vectors.T[::-1].copy()
+    for i in range(2):
+        alike = slice(i, int((values[i] - values <= TIED * values[0]).nonzero()[0][-1]) + 1)
+        within = np.einsum("ni,ai->na", offset, axes[alike])
+        first = within[first_far(np.linalg.norm(within, axis=1))]
+        basis = np.linalg.qr(np.column_stack([first, np.eye(len(first))]))[0]
+        axes[alike] = basis.T @ axes[alike]
+        along = np.einsum("ni,i->n", offset, axes[i])
+        skew = float((weights * along**3).sum())
+        if abs(skew) <= TIED * max(float(values[0]), 0.0) ** 1.5:
+            skew = float(along[first_far(np.abs(along))])
+        axes[i] *= -1.0 if skew < 0 else 1.0
+    axes[2] = np.cross(axes[0], axes[1])
+    return axes
+
+
+def first_far(distance: FloatArray) -> int:
+    """The first of (n,) distances that is more than FAR of the greatest, or 0."""
+    return int((distance > FAR * distance.max()).argmax())
 
 
 def face_weights(plant: Plant) -> FloatArray:
-    """(f,) share of the plant's area, at least LIGHTEST of the mean; equal if there is no area."""
+    """(f,) share of the plant's area, at least LIGHTEST of the mean; equal if there is no area.
+
+    In steps of SAME of the mean, as the features are.
+    """
     areas = plant.face_areas / (plant.radius or 1.0) ** 2
     mean = areas.mean()
     if mean == 0:
         return np.full(len(areas), 1 / len(areas))
-    weights = np.maximum(areas / mean, LIGHTEST)
+    weights = np.round(np.maximum(areas / mean, LIGHTEST) / SAME) * SAME
     return np.asarray(weights / weights.sum())
 
 
@@ -120,7 +167,8 @@ def quads(plant: Plant, group: Labels | None = None) -> Labels:
     """
     corners = plant.corners
     edges = corners - np.roll(corners, 1, axis=1)
-    longest = np.einsum("fij,fij->fi", edges, edges).argmax(axis=1)
+    squared = np.einsum("fij,fij->fi", edges, edges)
+    longest = (squared >= (1 - TIED) * squared.max(axis=1, keepdims=True)).argmax(axis=1)
     rows = np.arange(len(corners))
     a, b = corners[rows, longest], corners[rows, longest - 1]
     along = b - a
