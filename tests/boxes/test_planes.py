@@ -95,6 +95,15 @@ def test_turned_and_moved_faces_have_turned_and_moved_planes() -> None:
     assert np.allclose(np.linalg.det(there.axes), 1)
 
 
+@pytest.mark.parametrize("noise", [0.0, 1e-12])
+def test_of_two_crossed_cards_the_first_has_the_plane(noise: float) -> None:
+    """Both planes are equally good, and so is every one between them; rounding must not choose."""
+    corners = np.concatenate([card(Y, X, Z), card(Y, X, Y)]) @ some_rotation().T
+    corners += noise * np.random.default_rng(0).normal(size=corners.shape)
+    boxes = oriented_planes(corners, np.zeros(4, dtype=np.int32), 1)
+    assert np.abs(boxes.axes[0, 2] @ (some_rotation() @ Y)) == pytest.approx(1, abs=1e-9)
+
+
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
 def test_faces_without_area_have_planes(scale: float) -> None:
     line = np.array([[[0.0, 0, 0], [1, 1, 1], [2, 2, 2]]]) * scale

@@ -6,8 +6,9 @@ the eigenvector with the smallest eigenvalue of
     scatter / trace(scatter)  -  mean of n n^T over the area
 
 scatter being the second moment of the cluster's surface about its centroid: a direction in which
-the cluster is thin, and towards which its faces look. In that plane the sides follow the rectangle
-of least area.
+the cluster is thin, and towards which its faces look. Where several directions are equally good (a
+leaf of two crossed cards), the first face decides. In that plane the sides follow the rectangle of
+least area.
 """
 
 from __future__ import annotations
@@ -20,6 +21,11 @@ from vegtool.arrays import FloatArray, IntArray, unit
 from vegtool.boxes.box import Boxes
 from vegtool.boxes.groups import Groups
 from vegtool.boxes.rectangle import least_rectangle
+
+TIED = 1e-6
+"""Eigenvalues, which lie within -1 to 1, that close are equal."""
+FAR = 0.618
+"""Of the greatest: the first face that looks that much along the equally good directions decides."""
 
 
 def oriented_planes(corners: FloatArray, cluster: IntArray, count: int) -> Boxes:
@@ -73,8 +79,17 @@ def plane_normals(local: FloatArray, groups: Groups) -> FloatArray:
         looks[:, i, j] = looks[:, j, i] = groups.sum(weight * facing[i] * facing[j]) / total
     trace = np.trace(scatter, axis1=1, axis2=2)
     scatter /= np.where(trace > 0, trace, 1.0)[:, None, None]
-    _, vectors = np.linalg.eigh(scatter - looks)
-    return np.asarray(vectors[:, :, 0])
+    values, vectors = np.linalg.eigh(scatter - looks)
+    normal = vectors[:, :, 0].copy()
+    parts = list(groups.slices())
+    for i in np.flatnonzero(values[:, 1] - values[:, 0] <= TIED):
+        good = vectors[i][:, values[i] - values[i, 0] <= TIED].T
+        along = good @ facing[:, parts[i]]
+        length = np.linalg.norm(along, axis=0)
+        first = int((length > FAR * length.max()).argmax())
+        if length[first] > 0:  # else no face has an area
+            normal[i] = along[:, first] / length[first] @ good
+    return normal
 
 
 def frames_about(normal: FloatArray) -> FloatArray:
