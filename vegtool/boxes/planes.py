@@ -25,7 +25,7 @@ from vegtool.boxes.rectangle import least_rectangle
 TIED = 1e-6
 """Eigenvalues, which lie within -1 to 1, that close are equal."""
 FAR = 0.618
-"""Of the greatest: the first face that looks that much along the equally good directions decides."""
+"""Of the greatest: the first face that looks so much along equally good directions decides."""
 
 
 def oriented_planes(corners: FloatArray, cluster: IntArray, count: int) -> Boxes:
@@ -82,13 +82,13 @@ def plane_normals(local: FloatArray, groups: Groups) -> FloatArray:
     values, vectors = np.linalg.eigh(scatter - looks)
     normal = vectors[:, :, 0].copy()
     parts = list(groups.slices())
-    for i in np.flatnonzero(values[:, 1] - values[:, 0] <= TIED):
-        good = vectors[i][:, values[i] - values[i, 0] <= TIED].T
-        along = good @ facing[:, parts[i]]
+    for tied in np.flatnonzero(values[:, 1] - values[:, 0] <= TIED):
+        good = vectors[tied][:, values[tied] - values[tied, 0] <= TIED].T
+        along = good @ facing[:, parts[tied]]
         length = np.linalg.norm(along, axis=0)
         first = int((length > FAR * length.max()).argmax())
         if length[first] > 0:  # else no face has an area
-            normal[i] = along[:, first] / length[first] @ good
+            normal[tied] = along[:, first] / length[first] @ good
     return normal
 
 
