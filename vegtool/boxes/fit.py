@@ -4,7 +4,8 @@ Paper: Colditz, Coconu, Deussen, Hege: Real-time rendering of complex photoreali
 using hybrid level-of-detail approaches (2005), section 2.1: a first box is jittered in steps of
 one degree. Here the steps go from coarse to fine, which leaves the local minima that single
 one-degree steps stick in, all neighbours of all boxes are tried at once, and a grid of starts
-precedes them. Only points that can touch a box take part: the extreme ones in many directions,
+precedes them; where a cluster spreads alike along two axes, exact rectangles have the last word
+(flush.py). Only points that can touch a box take part: the extreme ones in many directions,
 after the cluster has been stretched to equal spread along its principal axes. The box that comes
 out is measured on all points.
 """
@@ -18,11 +19,14 @@ import numpy.typing as npt
 
 from vegtool.arrays import FloatArray, IntArray
 from vegtool.boxes.box import MIN_EXTENT, Boxes
+from vegtool.boxes.flush import flush_box
 from vegtool.boxes.groups import Groups
 from vegtool.boxes.options import BoxOptions
 
 BLOCK = 512
 """Points whose extremes are sought together: their products stay in the processor's cache."""
+TIED = 1e-6
+"""Variances that differ by less, as a fraction of the largest, leave the principal axes open."""
 LEAST_SPREAD = 1e-6
 """Standard deviation, as a fraction of the largest, below which a cluster counts as flat there."""
 TURNS_PER_STEP = 12
@@ -62,7 +66,10 @@ def fit_boxes(
     by_size = np.argsort([len(s) for s in support], kind="stable")
     for start in range(0, len(groups), BATCH):
         batch = by_size[start : start + BATCH]
-        found[batch] = search([support[i] for i in batch], options.steps_deg) @ frames[batch]
+        found[batch] = search([support[i] for i in batch], options.steps_deg)
+    for i in np.flatnonzero(alike(spread)):
+        found[i] = flush_box(support[i], found[i])
+    found = found @ frames
     low, high = extents(local, groups, found)
     here = groups.present
     axes[here], half[here] = longest_first(found, (high - low) / 2 * scale[:, None])
@@ -100,6 +107,12 @@ def principal_axes(local: FloatArray, groups: Groups) -> tuple[FloatArray, Float
     axes = np.swapaxes(vectors, 1, 2)[:, ::-1].copy()
     axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
     return axes, np.sqrt(np.maximum(values[:, ::-1], 0.0))
+
+
+def alike(spread: FloatArray) -> npt.NDArray[np.bool_]:
+    """(g,) whether points spread alike along two or three axes: which these are, rounding tells."""
+    variance = spread**2
+    return np.asarray((-np.diff(variance, axis=1) <= TIED * variance[:, :1]).any(axis=1))
 
 
 def support_points(
