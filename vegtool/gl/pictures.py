@@ -24,9 +24,6 @@ CLIP_PLANES = (0x3000, 0x3001, 0x3002, 0x3003)
 PICTURES_PER_ROW = 1024
 SAMPLE_LIMIT = 4_000_000
 """Samples drawn at a time, 12 bytes each; larger atlases are drawn tile by tile."""
-MINIFIED = 4.0
-"""Texels of a source per sample, along each axis, from which samples take one texel instead of
-four: filtering would average a sixteenth of what lies between samples and costs a third more."""
 LEAST_HALF_SIZE = 1e-7
 """Of the plant's radius: keeps the scale of a picture without width finite; it stays empty."""
 
@@ -187,8 +184,7 @@ def _draw(
             shader["tile"] = tile
             shader["vertices"] = 2
             shader["pictures"] = 3
-            coarse = buffers.texels_per_metre[group.number] > MINIFIED * samples_per_metre
-            buffers.use(group, shader, point_sampled=bool(coarse))
+            buffers.use(group, shader, point_sampled=buffers.minified(group, samples_per_metre))
             buffers.vertex_texture.use(2)
             table.use(3)
             culling = 0 if group.material.double_sided else moderngl.CULL_FACE

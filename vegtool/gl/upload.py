@@ -27,6 +27,8 @@ VERTEX_FLOATS = 12
 """Per vertex: position, u, normal, v, colour (4); three vec4, as attributes or as texels."""
 VERTICES_PER_ROW = 1024
 """Of the vertex data texture, or as many more as keep its height below the driver's limit."""
+MINIFIED = 4.0
+"""Texels per sample, along each axis, from which samples take one texel instead of four."""
 
 
 @dataclass(frozen=True)
@@ -128,6 +130,13 @@ class PlantBuffers:
         pixels = np.array([0.0 if i is None else np.prod(i.pixels.shape[:2]) for i in images])
         ratio = np.divide(mapped * pixels, surface, out=np.zeros(materials), where=surface > 0)
         return np.asarray(np.sqrt(ratio))
+
+    def minified(self, group: MaterialGroup, samples_per_metre: float) -> bool:
+        """Whether texels lie so dense that filtering averages a sixteenth of them at most, and
+        costs a third more for it; never with mips."""
+        if self._mipmaps or group.material.color_texture is None:
+            return False
+        return bool(self.texels_per_metre[group.number] > MINIFIED * samples_per_metre)
 
     def vertex_array(self, program: moderngl.Program) -> moderngl.VertexArray:
         """The plant as input of `program`, which declares in_position_u, in_normal_v, in_color."""

@@ -37,7 +37,9 @@ def contact_sheet(chain: LodChain) -> bytes:
         for level in levels:
             camera = framed(plant.center, plant.radius, VIEW, level.near_distance_m, chain.display)
             with PlantBuffers(client_plant(level), mipmaps=True) as buffers:
-                cells.append(_cropped(truth(original, camera), live(buffers, camera)))
+                cells.append(
+                    _cropped(truth(original, camera, supersample=4), live(buffers, camera))
+                )
     width = MARGIN + len(levels) * (CELL + MARGIN)
     height = 2 * (CELL + MARGIN) + MARGIN + CAPTION + 34
     sheet = Image.new("RGB", (width, height), PAPER)

@@ -14,8 +14,8 @@ from vegtool.measure.views import Camera
 from vegtool.plant import Material, Plant, Texture
 from vegtool.srgb import srgb_from_linear
 
-TRUTH_SUPERSAMPLE = 4
-"""Per axis, for pictures that are looked at; scores ask for more."""
+TRUTH_SUPERSAMPLE = 8
+"""Samples per axis and pixel."""
 
 
 def client_plant(level: Level) -> Plant:

@@ -4,7 +4,10 @@ uniform vec4 base_color;
 uniform float alpha_cutoff;  // 0 for opaque materials: nothing is below it
 
 vec3 surface_color(vec2 uv, vec4 vertex_color) {
-    vec4 color = texture(color_map, uv) * base_color * vertex_color;
+    vec4 color = base_color * vertex_color;
+#ifndef NO_COLOR_MAP
+    color *= texture(color_map, uv);
+#endif
     if (color.a < alpha_cutoff) discard;
     return color.rgb;
 }

@@ -1,0 +1,89 @@
+"""Pictures averaged and tiled on the GPU, against the plain mean of what was drawn."""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+import pytest
+
+from vegtool.errors import CapabilityError
+from vegtool.gl import targets
+from vegtool.gl.context import context, framebuffer_kept
+from vegtool.gl.draw import Light, begin, draw, render
+from vegtool.gl.targets import drawing_target
+from vegtool.gl.upload import PlantBuffers
+from vegtool.growth import sample
+from vegtool.lod import Display
+from vegtool.measure.views import around, direction
+
+pytestmark = pytest.mark.gl
+
+
+@pytest.fixture(scope="module")
+def tree():
+    with PlantBuffers(sample("broadleaf", 2000)) as buffers:
+        yield buffers
+
+
+def camera_of(buffers, pixels=40):
+    """The whole plant about so many pixels high, in a picture of odd sides."""
+    display, plant = Display(), buffers.plant
+    extent = float(np.ptp(plant.positions, axis=0).max())
+    return around(plant.positions, direction(25, 8), display.distance_m(pixels / extent), display)
+
+
+def picture_of(buffers, camera, **how):
+    size = camera.width, camera.height
+    return draw(buffers, camera.view_projection(), size, camera.target, Light(), **how)
+
+
+@pytest.mark.parametrize("k", [1, 3, 8])
+def test_supersampling_is_the_mean_of_the_samples(tree, k):
+    """The same drawing, read back whole and averaged by numpy; half floats in both."""
+    camera = camera_of(tree)
+    size = k * camera.width, k * camera.height
+    large = drawing_target(tree.ctx, size, 0)
+    density = k * camera.focal_px / camera.distance_m
+    with framebuffer_kept(tree.ctx):
+        begin(large, (0, 0, *size))
+        render(tree, camera.view_projection(), camera.target, Light(), density)
+        data = large.frame.read((0, 0, *size), components=4, dtype="f2")
+    samples = np.frombuffer(data, np.float16).reshape(size[1], size[0], 4)[::-1].astype(np.float64)
+    mean = samples.reshape(camera.height, k, camera.width, k, 4).mean(axis=(1, 3))
+    np.testing.assert_allclose(picture_of(tree, camera, supersample=k), mean, atol=1e-6)
+    assert mean[..., 3].any()
+
+
+@pytest.mark.parametrize("how", [{"supersample": 4}, {"samples": 4}], ids=["truth", "live"])
+def test_a_picture_in_tiles_is_the_picture(tree, how, monkeypatch):
+    """Where a target holds few samples, and where a driver's textures are narrow."""
+    camera = camera_of(tree)
+    whole = picture_of(tree, camera, **how)
+    monkeypatch.setattr(targets, "SAMPLE_LIMIT", 2500)
+    tiled = picture_of(tree, camera, **how)
+    # a tile's matrix is another one: a sample on an edge may fall to the other side
+    assert np.mean(np.abs(tiled - whole).max(axis=2) > 1e-3) < 0.02
+
+
+def test_targets_are_kept_and_grow():
+    ctx = context()
+    first = drawing_target(ctx, (100, 100), 0)
+    assert drawing_target(ctx, (90, 40), 0) is first
+    grown = drawing_target(ctx, (100, first.color.height + 1), 0)
+    assert grown.color.width >= first.color.width
+    assert type(first.color.mglo).__name__ == "InvalidObject", "the smaller one is freed"
+
+
+def test_a_larger_picture_before_leaves_nothing_in_a_smaller_one(tree):
+    small = camera_of(tree, 20)
+    before = picture_of(tree, small, supersample=2)
+    picture_of(tree, camera_of(tree, 60), supersample=2)
+    np.testing.assert_array_equal(picture_of(tree, small, supersample=2), before)
+
+
+def test_a_driver_that_cannot_multisample_is_named(tree, monkeypatch):
+    monkeypatch.setattr(moderngl.Context, "max_samples", 1)
+    with pytest.raises(CapabilityError, match="4x multisampling") as caught:
+        picture_of(tree, camera_of(tree), samples=4)
+    assert caught.value.exit_code == 5
+    assert picture_of(tree, camera_of(tree), supersample=2).any(), "the truth needs none"
