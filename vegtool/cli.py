@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 import signal
 import sys
+from dataclasses import asdict
 from io import TextIOWrapper
 from pathlib import Path
 from typing import Annotated, Any
@@ -18,9 +19,10 @@ import typer
 from vegtool import __version__
 from vegtool.console import Console, human_bytes, table
 from vegtool.convert import ConvertOptions
-from vegtool.errors import BatchError, UsageError, VegtoolError, unknown
+from vegtool.errors import BatchError, QualityError, UsageError, VegtoolError, unknown
 from vegtool.flags import flags, read_config
 from vegtool.formats import ReadOptions
+from vegtool.report.options import ReportOptions
 
 app = typer.Typer(
     name="vegtool",
@@ -129,6 +131,90 @@ def convert_command(
         names = ", ".join(str(o.job.source) for o in failed)
         kind = BatchError if len(failed) < len(outcomes) else VegtoolError
         raise kind(f"{len(failed)} of {len(outcomes)} inputs failed: {names}")
+
+
+@app.command("report")
+@flags
+def report_command(
+    *,
+    inputs: Annotated[
+        list[Path] | None, typer.Argument(help="Plant models, or folders of them.", parser=_path)
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("-o", "--out", help="Folder for the report.", metavar="FOLDER", parser=_path),
+    ] = None,
+    report: ReportOptions,
+    read: ReadOptions,
+    stability: Annotated[
+        bool, typer.Option("--stability", help="Check the arithmetic on extreme cases instead.")
+    ] = False,
+    force: Force = False,
+    json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = 0,
+    config: Config = None,
+) -> None:
+    """Plot error against run time: every method and budget, beside what others do.
+
+    Writes report.html, which needs nothing else, report.json and report.csv. An interrupted report
+    goes on where it stopped.
+
+    [bold]Examples[/bold]
+
+        vegtool report oak.glb -o out/
+
+        vegtool report models/ -o out/ --methods branches,kmeans --budgets 64,256
+
+        vegtool report --stability
+    """
+    console = Console(-1 if quiet else verbose, json)
+    if stability:
+        _report_stability(console, out, force, bool(inputs))
+        return
+    if not inputs or out is None:
+        lacking = "a folder for the report (-o out/)" if inputs else "a plant to report on"
+        raise UsageError(f"expected {lacking}; got none")
+    from vegtool.batch import find_jobs
+    from vegtool.report import report as make_report
+    from vegtool.report.text import as_summary, summary_text
+
+    sources = {job.name: job.source for job in find_jobs(inputs)}
+    with console.bar("report") as progress:
+        found = make_report(sources, report, read, out, force, progress)
+    for plant in found.plants:
+        for note in plant.notes:
+            console.say(f"{plant.name}: {note}")
+    console.result(as_summary(found, out), summary_text(found, out))
+    for name, error in found.failed.items():
+        console.say(f"error: {name}: {error}", at=-1)
+    if found.failed:
+        kind = BatchError if found.plants else VegtoolError
+        names = ", ".join(str(sources[name]) for name in found.failed)
+        raise kind(f"{len(found.failed)} of {len(sources)} plants failed: {names}")
+
+
+def _report_stability(console: Console, out: Path | None, force: bool, plants: bool) -> None:
+    """The table of stability; QualityError where a case fails."""
+    if plants:
+        raise UsageError(
+            "--stability: checks cases of its own, no plants; leave out one of the two"
+        )
+    from vegtool.formats.atomic import FileSet, check_free
+    from vegtool.stability import markdown, run
+
+    if out is not None:
+        check_free(out, ["stability.md"], force)
+    with console.bar("stability") as progress:
+        results = run(progress)
+    text = markdown(results)
+    if out is not None:
+        with FileSet(out, force) as files:
+            files.add("stability.md", text.encode())
+    console.result([asdict(result) for result in results], text)
+    failed = [result.name for result in results if not result.passed]
+    if failed:
+        raise QualityError(f"{len(failed)} of {len(results)} cases failed: {', '.join(failed)}")
 
 
 @app.command("inspect")

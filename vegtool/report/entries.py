@@ -1,0 +1,102 @@
+"""Which rows a plant's report has, and how what they show is made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+
+from vegtool.baselines import BASELINES, baseline
+from vegtool.convert import (
+    TRIANGLES_PER_BILLBOARD,
+    ConvertOptions,
+    billboard_level,
+    distance_of,
+    near_pixels,
+)
+from vegtool.errors import CapabilityError
+from vegtool.gl.upload import PlantBuffers
+from vegtool.lod import Level
+from vegtool.measure.views import View
+from vegtool.progress import Progress
+from vegtool.report.options import ReportOptions
+from vegtool.report.rows import LIVE
+
+Shown = Level | Callable[[View], Level]
+"""A level, or the one that is shown in a view."""
+
+
+@dataclass(frozen=True, eq=False)
+class Made:
+    """What an entry shows. triangles, texels: that a client holds. seconds: by stage of making it,
+    asked once all of it was shown."""
+
+    shown: Shown
+    triangles: int
+    texels: int
+    seconds: Callable[[], Mapping[str, float]]
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A row to be: its name, unique within a plant; its family; the budget of billboards, or None.
+
+    pixels: size on screen that it is made for, or None. make: from the plant's buffers (without
+    mipmaps), what is shown; raises CapabilityError where it cannot be made here.
+    """
+
+    name: str
+    family: str
+    budget: int | None
+    pixels: float | None
+    make: Callable[[PlantBuffers, Progress], Made]
+
+
+def entries(options: ReportOptions) -> list[Entry]:
+    """The line to beat, then methods and baselines, each with its budgets, most first."""
+    budgets = options.budget_counts[::-1]
+    found = [Entry(LIVE, LIVE, None, None, _original)]
+    for method in options.method_names:
+        make = partial(_billboards, method, options)
+        found += [_budgeted(method, budget, partial(make, budget)) for budget in budgets]
+    for name, maker in BASELINES.items():
+        if maker.budgeted:
+            found += [_budgeted(name, b, partial(_baseline, name, b)) for b in budgets]
+        else:
+            found.append(Entry(name, name, None, None, partial(_baseline, name, 0)))
+    return found
+
+
+def _budgeted(family: str, budget: int, make: Callable[[PlantBuffers, Progress], Made]) -> Entry:
+    return Entry(f"{family} {budget}", family, budget, near_pixels(budget), make)
+
+
+def _original(buffers: PlantBuffers, progress: Progress) -> Made:
+    return _made(Level("mesh", mesh=buffers.plant, geometric_error_m=(0.0, 0.0)))
+
+
+def _billboards(
+    method: str, options: ReportOptions, budget: int, buffers: PlantBuffers, progress: Progress
+) -> Made:
+    convert = ConvertOptions(
+        method=method,
+        billboards=budget,
+        fov=options.fov,
+        image_height=options.image_height,
+        seed=options.seed,
+    )
+    near_m = distance_of(buffers.plant, options.display, near_pixels(budget))
+    return _made(billboard_level(buffers, convert, budget, near_m, progress))
+
+
+def _baseline(name: str, budget: int, buffers: PlantBuffers, progress: Progress) -> Made:
+    progress(name, 0.0)
+    found = baseline(buffers.plant, name, TRIANGLES_PER_BILLBOARD * budget)
+    if found.level is None:
+        raise CapabilityError(found.missing)
+    return Made(found.level, found.triangles, found.texels, lambda: found.seconds)
+
+
+def _made(level: Level) -> Made:
+    return Made(level, level.triangles, level.texels, lambda: level.seconds)

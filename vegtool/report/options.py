@@ -1,0 +1,88 @@
+"""What a report compares, declared once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+from vegtool.clustering import METHODS
+from vegtool.errors import UsageError
+from vegtool.lod import Display
+from vegtool.measure.options import MeasureOptions
+from vegtool.options import option
+
+MOST_BILLBOARDS = 100_000
+
+
+def _as_for_convert(name: str) -> Any:
+    """The same option as measuring has in a conversion."""
+    same = next(item for item in fields(MeasureOptions) if item.name == name)
+    return field(default=same.default, metadata=same.metadata)
+
+
+@dataclass(frozen=True)
+class ReportOptions:
+    """Which rows a report has. The command line makes its flags from these fields.
+
+    Raises UsageError for a method or a budget that is none.
+    """
+
+    methods: str = option(
+        ",".join(METHODS), "Methods to compare, with commas between.", metavar="NAME,..."
+    )
+    budgets: str = option(
+        "16,64,256,1024", "Billboards of each method, with commas between.", metavar="N,..."
+    )
+    views: str = _as_for_convert("views")
+    view_count: int = option(12, "Directions that every error is a mean over.", least=1, most=1000)
+    max_error: float | None = _as_for_convert("max_error")
+    max_pixels: float | None = _as_for_convert("max_pixels")
+    fov: float = option(
+        Display().fov_y_deg,
+        "Vertical field of view that distances are for, in degrees.",
+        least=1.0,
+        most=170.0,
+    )
+    image_height: int = option(
+        Display().image_height_px,
+        "Image height that distances are for, in pixels.",
+        least=16,
+        most=32768,
+    )
+    seed: int = option(0, "Seed of every random choice.", least=0)
+
+    def __post_init__(self) -> None:
+        _ = self.method_names, self.budget_counts
+
+    @property
+    def display(self) -> Display:
+        """For whom distances are stated."""
+        return Display(self.fov, self.image_height)
+
+    @property
+    def method_names(self) -> tuple[str, ...]:
+        """The methods, in the order given."""
+        names = _words(self.methods)
+        wrong = [name for name in names if name not in METHODS]
+        if wrong or not names:
+            found = ", ".join(wrong) or "none"
+            raise UsageError(f"--methods: expected some of {', '.join(METHODS)}; got {found}")
+        return names
+
+    @property
+    def budget_counts(self) -> tuple[int, ...]:
+        """The budgets, smallest first."""
+        words = _words(self.budgets)
+        wrong = [w for w in words if not w.isdecimal() or not 1 <= int(w) <= MOST_BILLBOARDS]
+        if wrong or not words:
+            found = ", ".join(wrong) or "none"
+            raise UsageError(
+                f"--budgets: expected whole numbers from 1 to {MOST_BILLBOARDS:,} with commas "
+                f"between, such as 16,64,256; got {found}"
+            )
+        return tuple(sorted({int(word) for word in words}))
+
+
+def _words(text: str) -> tuple[str, ...]:
+    """The words between commas, each once."""
+    return tuple(dict.fromkeys(word.strip() for word in text.split(",") if word.strip()))

@@ -1,0 +1,95 @@
+"""What the eye compares: the truth and what is shown in its place, at two sizes, and where they
+differ."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from io import BytesIO
+from math import log
+
+import numpy as np
+from matplotlib import colormaps
+from PIL import Image
+
+from vegtool.arrays import ByteArray
+from vegtool.convert import distance_of
+from vegtool.gl.draw import Light
+from vegtool.gl.upload import PlantBuffers
+from vegtool.lod import Display, Level
+from vegtool.measure.flip import difference, perceived
+from vegtool.measure.metrics import BACKGROUND, Picture
+from vegtool.measure.pictures import client_plant, live, over, truth
+from vegtool.measure.views import CLOSEST, Camera, View, around, direction
+from vegtool.report.entries import Entry, Shown
+from vegtool.report.rows import Pictures
+
+SIZES = (200, 75)
+"""Pixels, the plant's longest extent."""
+VIEW = View(direction(25.0, 8.0), direction(65.0, 40.0))
+"""A walker's, with the sun behind his shoulder."""
+SAMPLES = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Cameras and truths by size, of one plant."""
+
+    cameras: Mapping[int, Camera]
+    truths: Mapping[int, Picture]
+
+
+def scene(buffers: PlantBuffers, display: Display) -> Scene:
+    """The truths of a plant, at those sizes that are seen from outside it. buffers: without
+    mipmaps."""
+    plant = buffers.plant
+    distances = {size: distance_of(plant, display, size) for size in SIZES}
+    cameras = {
+        size: around(plant.positions, VIEW.direction, distance, display)
+        for size, distance in distances.items()
+        if distance > CLOSEST * plant.radius
+    }
+    light = Light(direction=VIEW.sun)
+    return Scene(
+        cameras, {s: truth(buffers, camera, light, SAMPLES) for s, camera in cameras.items()}
+    )
+
+
+def sizes_of(entry: Entry, among: Sequence[Entry]) -> list[int]:
+    """The sizes at which an entry stands for its family: where its budget is made for a size nearer
+    to them than the family's other budgets."""
+    return [size for size in SIZES if entry is _nearest(size, entry.family, among)]
+
+
+def _nearest(size: int, family: str, among: Sequence[Entry]) -> Entry:
+    own = [entry for entry in among if entry.family == family]
+    return min(own, key=lambda e: 0.0 if e.pixels is None else abs(log(e.pixels / size)))
+
+
+def of_truth(scene: Scene) -> Pictures:
+    """The truth, as PNGs by size."""
+    return {size: (_png(over(t, BACKGROUND)),) for size, t in scene.truths.items()}
+
+
+def of_shown(shown: Shown, scene: Scene, sizes: Sequence[int]) -> Pictures:
+    """What is shown, and its difference from the truth by FLIP, as PNGs by size."""
+    level = shown if isinstance(shown, Level) else shown(VIEW)
+    found = {}
+    with PlantBuffers(client_plant(level), mipmaps=True) as buffers:
+        for size in (s for s in sizes if s in scene.cameras):
+            picture = live(buffers, scene.cameras[size], Light(direction=VIEW.sun))
+            error = difference(*(perceived(_linear(p)) for p in (scene.truths[size], picture)))
+            colours = colormaps["magma"](error, bytes=True)[..., :3]
+            found[size] = (_png(over(picture, BACKGROUND)), _png(colours))
+    return found
+
+
+def _linear(picture: Picture) -> Picture:
+    """(h, w, 3) over the background, 0 to 1."""
+    return np.asarray(np.clip(picture[..., :3] + (1 - picture[..., 3:]) * BACKGROUND, 0, 1))
+
+
+def _png(picture: ByteArray) -> bytes:
+    stream = BytesIO()
+    Image.fromarray(picture).save(stream, "PNG", compress_level=6)
+    return stream.getvalue()
