@@ -9,12 +9,15 @@ import pytest
 from vegtool.errors import CapabilityError
 from vegtool.gl import targets
 from vegtool.gl.context import context, framebuffer_kept
-from vegtool.gl.draw import Light, begin, draw, render
+from vegtool.gl.count import count_fragments
+from vegtool.gl.draw import MSAA, Light, Shot, begin, draw, render
 from vegtool.gl.targets import drawing_target
+from vegtool.gl.timing import time_frames
 from vegtool.gl.upload import PlantBuffers
 from vegtool.growth import sample
 from vegtool.lod import Display
-from vegtool.measure.views import around, direction
+from vegtool.measure.views import Camera, around, direction
+from vegtool.plant import Material, Plant
 
 pytestmark = pytest.mark.gl
 
@@ -32,9 +35,12 @@ def camera_of(buffers, pixels=40):
     return around(plant.positions, direction(25, 8), display.distance_m(pixels / extent), display)
 
 
+def shot_of(camera):
+    return Shot(camera.view_projection(), camera.target, camera.width, camera.height)
+
+
 def picture_of(buffers, camera, **how):
-    size = camera.width, camera.height
-    return draw(buffers, camera.view_projection(), size, camera.target, Light(), **how)
+    return draw(buffers, shot_of(camera), Light(), **how)
 
 
 @pytest.mark.parametrize("k", [1, 3, 8])
@@ -43,10 +49,9 @@ def test_supersampling_is_the_mean_of_the_samples(tree, k):
     camera = camera_of(tree)
     size = k * camera.width, k * camera.height
     large = drawing_target(tree.ctx, size, 0)
-    density = k * camera.focal_px / camera.distance_m
     with framebuffer_kept(tree.ctx):
-        begin(large, (0, 0, *size))
-        render(tree, camera.view_projection(), camera.target, Light(), density)
+        begin(large, size)
+        render(tree, shot_of(camera), Light(), k)
         data = large.frame.read((0, 0, *size), components=4, dtype="f2")
     samples = np.frombuffer(data, np.float16).reshape(size[1], size[0], 4)[::-1].astype(np.float64)
     mean = samples.reshape(camera.height, k, camera.width, k, 4).mean(axis=(1, 3))
@@ -87,3 +92,23 @@ def test_a_driver_that_cannot_multisample_is_named(tree, monkeypatch):
         picture_of(tree, camera_of(tree), samples=4)
     assert caught.value.exit_code == 5
     assert picture_of(tree, camera_of(tree), supersample=2).any(), "the truth needs none"
+
+
+def test_fragments_are_counted_whatever_hides_or_cuts_out(tree):
+    """Two squares of 32 x 32 pixels, one behind the other, cut out everywhere; half seen, one."""
+    leaf = Material("leaf", base_color=[1, 1, 1, 0.0], alpha_mode="mask", double_sided=True)
+    both = Material("leaf", base_color=[1, 1, 1, 0.0], alpha_mode="mask")
+    corner = np.array([[-0.5, -0.5, 0], [0.5, -0.5, 0], [0.5, 0.5, 0], [-0.5, 0.5, 0]])
+    faces = np.array([[0, 1, 2], [0, 2, 3], [4, 6, 5], [4, 7, 6]])  # the second faces away
+    for material, counted in ((leaf, 2 * 32 * 32), (both, 32 * 32)):
+        positions = np.concatenate([corner, corner])
+        normals, uvs = np.tile([0.0, 0, 1], (8, 1)), np.zeros((8, 2))
+        plant = Plant("squares", positions, normals, uvs, faces, [0] * 4, (material,))
+        with PlantBuffers(plant) as buffers:
+            camera = Camera(np.zeros(3), direction(0, 0), 10, 320, 64, 48, (32.0, 24.0), 2.0)
+            assert count_fragments(buffers, shot_of(camera)) == counted
+
+
+def test_frames_are_timed_as_often_as_asked(tree):
+    seconds = time_frames(tree, shot_of(camera_of(tree)), Light(), MSAA, 5)
+    assert seconds.shape == (5,) and (seconds > 0).all()

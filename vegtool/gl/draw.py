@@ -16,15 +16,23 @@ from vegtool.gl import targets
 from vegtool.gl.context import check, describe, framebuffer_kept
 from vegtool.gl.program import program
 from vegtool.gl.targets import Target, drawing_target, pixel_target
-from vegtool.gl.upload import PlantBuffers
+from vegtool.gl.upload import MaterialGroup, PlantBuffers
 
 Picture = npt.NDArray[np.float32]
 """(height, width, 4): linear light premultiplied by coverage, and coverage."""
 MSAA = 4
 """Samples per pixel of a live picture, as engines do by default."""
 
-Tile = tuple[int, int, int, int]
-"""Pixels x0, y0 from the upper left, width, height: a part of a picture drawn at a time."""
+
+@dataclass(frozen=True, eq=False)
+class Shot:
+    """A camera in OpenGL's terms. view_projection: (4, 4), for positions relative to `target`,
+    (3,) metres. width, height: pixels."""
+
+    view_projection: FloatArray
+    target: FloatArray
+    width: int
+    height: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,85 +46,68 @@ class Light:
 
 
 def draw(
-    buffers: PlantBuffers,
-    view_projection: FloatArray,
-    size: tuple[int, int],
-    target: FloatArray,
-    light: Light | None = None,
-    supersample: int = 1,
-    samples: int = 0,
+    buffers: PlantBuffers, shot: Shot, light: Light, supersample: int = 1, samples: int = 0
 ) -> Picture:
     """The picture of a plant or level.
 
-    view_projection: (4, 4), for positions relative to `target`, (3,) metres. size: width, height
-    in pixels. supersample: samples per axis and pixel, averaged. samples: of multisampling, 0 for
-    none; alpha is tested once per pixel then, as in a client. Raises CapabilityError where OpenGL
-    cannot multisample so, or cannot hold the plant or the picture.
+    supersample: samples per axis and pixel, averaged. samples: of multisampling, 0 for none; alpha
+    is tested once per pixel then, as in a client. Raises CapabilityError where OpenGL cannot
+    multisample so, or cannot hold the plant or the picture.
     """
-    ctx, light = buffers.ctx, light or Light()
-    picture = np.empty((size[1], size[0], 4), np.float32)
-    density = supersample * _pixels_per_metre(view_projection, size)
+    ctx = buffers.ctx
+    picture = np.empty((shot.height, shot.width, 4), np.float32)
     with framebuffer_kept(ctx):
-        for tile in tiles(ctx, size, supersample):
-            x, y, width, height = tile
-            area = (0, 0, width * supersample, height * supersample)
-            drawn = drawing_target(ctx, area[2:], samples)
-            begin(drawn, area)
-            render(buffers, cropped(view_projection, size, tile), target, light, density)
-            pixels = _resolved(ctx, drawn, (width, height), samples or supersample, samples > 0)
-            picture[y : y + height, x : x + width] = pixels
+        for x, y, part in tiles(ctx, shot, supersample):
+            size = (0, 0, part.width, part.height)
+            data = draw_tile(buffers, part, light, supersample, samples).frame.read(
+                size, components=4, dtype="f4"
+            )
+            pixels = np.frombuffer(data, np.float32).reshape(part.height, part.width, 4)
+            picture[y : y + part.height, x : x + part.width] = pixels
         check(ctx)
     return picture
 
 
-def tiles(ctx: moderngl.Context, size: tuple[int, int], supersample: int) -> Iterator[Tile]:
-    """Parts of a picture that a target can hold; most pictures are one."""
-    width, height = size
-    columns = min(width, describe(ctx).max_texture // supersample)
-    rows = max(min(height, targets.SAMPLE_LIMIT // (columns * supersample**2)), 1)
-    for x, y in product(range(0, width, columns), range(0, height, rows)):
-        yield x, y, min(columns, width - x), min(rows, height - y)
+def tiles(ctx: moderngl.Context, shot: Shot, supersample: int) -> Iterator[tuple[int, int, Shot]]:
+    """Parts of a picture that a target can hold, and where they lie, in pixels right and down;
+    most pictures are one."""
+    columns = min(shot.width, describe(ctx).max_texture // supersample)
+    rows = max(min(shot.height, targets.SAMPLE_LIMIT // (columns * supersample**2)), 1)
+    for x, y in product(range(0, shot.width, columns), range(0, shot.height, rows)):
+        width, height = min(columns, shot.width - x), min(rows, shot.height - y)
+        crop = np.eye(4)
+        crop[0, 0], crop[0, 3] = shot.width / width, (shot.width - 2 * x - width) / width
+        crop[1, 1], crop[1, 3] = shot.height / height, (2 * y + height - shot.height) / height
+        yield x, y, Shot(crop @ shot.view_projection, shot.target, width, height)
 
 
-def cropped(view_projection: FloatArray, size: tuple[int, int], tile: Tile) -> FloatArray:
-    """The matrix whose whole picture is a tile of another's."""
-    (width, height), (x, y, w, h) = size, tile
-    crop = np.eye(4)
-    crop[0, 0], crop[0, 3] = width / w, (width - 2 * x - w) / w
-    crop[1, 1], crop[1, 3] = height / h, (2 * y + h - height) / h
-    return np.asarray(crop @ view_projection)
+def draw_tile(
+    buffers: PlantBuffers, shot: Shot, light: Light, supersample: int, samples: int
+) -> Target:
+    """Draw a picture that a target can hold; what is returned has it in its lower left corner,
+    top row first. The caller keeps the framebuffer (`framebuffer_kept`)."""
+    ctx = buffers.ctx
+    size = supersample * shot.width, supersample * shot.height
+    drawn = drawing_target(ctx, size, samples)
+    begin(drawn, size)
+    render(buffers, shot, light, supersample)
+    return _resolved(ctx, drawn, (shot.width, shot.height), supersample, samples)
 
 
-def _pixels_per_metre(view_projection: FloatArray, size: tuple[int, int]) -> float:
-    """At the target, which lies at the origin, across the view."""
-    row, forward = view_projection[0, :3], view_projection[3, :3]
-    across = row - forward * (row @ forward)
-    return float(np.linalg.norm(across) * size[0] / 2 / view_projection[3, 3])
-
-
-def begin(drawn: Target, area: tuple[int, int, int, int]) -> None:
-    """Draw into an area of a target from here on, empty and with a depth test."""
+def begin(drawn: Target, size: tuple[int, int]) -> None:
+    """Draw into the lower left corner of a target from here on, empty and with a depth test."""
+    area = (0, 0, *size)
     drawn.frame.viewport = area
     drawn.frame.use()
     drawn.frame.clear(viewport=area)
     drawn.frame.ctx.enable(moderngl.DEPTH_TEST)
 
 
-def render(
-    buffers: PlantBuffers,
-    view_projection: FloatArray,
-    target: FloatArray,
-    light: Light,
-    samples_per_metre: float = np.inf,
-) -> None:
-    """Draw a plant into the framebuffer in use; culls as its materials say.
-
-    samples_per_metre: at the target. Textures without mips that are much finer are not filtered.
-    """
+def render(buffers: PlantBuffers, shot: Shot, light: Light, supersample: int = 1) -> None:
+    """Draw a plant into the framebuffer in use, whose pixels are `supersample` of the shot's."""
     ctx = buffers.ctx
-    shift = np.eye(4)
-    shift[:3, 3] = buffers.origin - target
-    matrix = tuple((view_projection @ shift).T.ravel())
+    matrix = placed(buffers, shot)
+    samples_per_metre = supersample * _pixels_per_metre(shot)
     sun = tuple(light.direction / np.linalg.norm(light.direction))
     for group in buffers.groups:
         plain = () if group.material.color_texture is not None else ("NO_COLOR_MAP",)
@@ -127,32 +118,49 @@ def render(
         shader["sun"] = light.sun
         shader["sky"] = (light.sky_above, light.sky_below)
         buffers.use(group, shader, point_sampled=buffers.minified(group, samples_per_metre))
-        if group.material.double_sided:
-            ctx.disable(moderngl.CULL_FACE)
-        else:
-            ctx.enable(moderngl.CULL_FACE)
-        buffers.vertex_array(shader).render(vertices=3 * group.count, first=3 * group.first)
+        render_group(buffers, group, shader)
     ctx.disable(moderngl.CULL_FACE)
+
+
+def placed(buffers: PlantBuffers, shot: Shot) -> tuple[float, ...]:
+    """The uniform `view_projection` of camera.vert, for positions as they were uploaded."""
+    shift = np.eye(4)
+    shift[:3, 3] = buffers.origin - shot.target
+    return tuple((shot.view_projection @ shift).T.ravel())
+
+
+def render_group(buffers: PlantBuffers, group: MaterialGroup, shader: moderngl.Program) -> None:
+    """Draw the faces of one material, culled as it says."""
+    if group.material.double_sided:
+        buffers.ctx.disable(moderngl.CULL_FACE)
+    else:
+        buffers.ctx.enable(moderngl.CULL_FACE)
+    buffers.vertex_array(shader).render(vertices=3 * group.count, first=3 * group.first)
+
+
+def _pixels_per_metre(shot: Shot) -> float:
+    """At the target, across the view."""
+    row, forward = shot.view_projection[0, :3], shot.view_projection[3, :3]
+    across = row - forward * (row @ forward)
+    return float(np.linalg.norm(across) * shot.width / 2 / shot.view_projection[3, 3])
 
 
 _screens: WeakKeyDictionary[moderngl.Program, moderngl.VertexArray] = WeakKeyDictionary()
 
 
 def _resolved(
-    ctx: moderngl.Context, drawn: Target, size: tuple[int, int], samples: int, multisampled: bool
-) -> Picture:
-    width, height = size
+    ctx: moderngl.Context, drawn: Target, size: tuple[int, int], supersample: int, samples: int
+) -> Target:
     averaged = pixel_target(ctx, size)
-    averaged.frame.viewport = (0, 0, width, height)
+    averaged.frame.viewport = (0, 0, *size)
     averaged.frame.use()
     ctx.disable(moderngl.DEPTH_TEST)
-    defines = ("MULTISAMPLED",) if multisampled else ()
+    defines = ("MULTISAMPLED",) if samples else ()
     shader = program(ctx, "screen.vert", "resolve.frag", *defines)
-    shader["samples"] = samples
-    shader["height"] = height
+    shader["samples"] = samples or supersample
+    shader["height"] = size[1]
     if shader not in _screens:
         _screens[shader] = ctx.vertex_array(shader, [])
     drawn.color.use(0)
     _screens[shader].render(moderngl.TRIANGLES, vertices=3)
-    data = averaged.frame.read((0, 0, width, height), components=4, dtype="f4")
-    return np.frombuffer(data, np.float32).reshape(height, width, 4)
+    return averaged

@@ -27,6 +27,8 @@ VERTEX_FLOATS = 12
 """Per vertex: position, u, normal, v, colour (4); three vec4, as attributes or as texels."""
 VERTICES_PER_ROW = 1024
 """Of the vertex data texture, or as many more as keep its height below the driver's limit."""
+ANISOTROPY = 4.0
+"""Of textures with mips, where the driver has it: what engines ask for foliage by default."""
 MINIFIED = 4.0
 """Texels per sample, along each axis, from which samples take one texel instead of four."""
 
@@ -53,7 +55,8 @@ class PlantBuffers:
     matrix has to be as well.
     face_order: (f,) the plant's faces in the order of the index buffer, material by material.
     groups: one per material that has faces.
-    mipmaps: give textures mips, as a client does, and leave the colour under alpha 0 as it is.
+    mipmaps: give textures mips and 4x anisotropy, as a client does, and leave the colour under
+    alpha 0 as it is.
     """
 
     def __init__(
@@ -215,6 +218,7 @@ class PlantBuffers:
             )
             if self._mipmaps:
                 texture.build_mipmaps()
+                texture.anisotropy = min(ANISOTROPY, self.ctx.max_anisotropy)
             texture.filter = self._filter
             self._textures[key] = self._own(texture)
         return self._textures[key]

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from vegtool.arrays import ByteArray
+from vegtool.arrays import ByteArray, FloatArray
 from vegtool.gl.context import describe
-from vegtool.gl.draw import MSAA, Light, Picture, draw
+from vegtool.gl.count import count_fragments
+from vegtool.gl.draw import MSAA, Light, Picture, Shot, draw
+from vegtool.gl.timing import time_frames
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Level, billboard_quads
 from vegtool.measure.views import Camera
@@ -58,14 +60,33 @@ def truth(
     supersample: int = TRUTH_SUPERSAMPLE,
 ) -> Picture:
     """The original as it is: alpha tested per sample, no mips. buffers: without mipmaps."""
-    size = camera.width, camera.height
-    return draw(buffers, camera.view_projection(), size, camera.target, light, supersample)
+    return draw(buffers, _shot(camera), light or Light(), supersample)
 
 
 def live(buffers: PlantBuffers, camera: Camera, light: Light | None = None) -> Picture:
-    """What a client shows: mip-mapped textures, alpha tested once per pixel, 4x multisampling."""
-    size = camera.width, camera.height
-    return draw(buffers, camera.view_projection(), size, camera.target, light, 1, MSAA)
+    """What a client shows: mip-mapped textures, alpha tested once per pixel, 4x multisampling
+    resolved in linear light. buffers: with mipmaps. Raises CapabilityError where OpenGL cannot.
+    """
+    return draw(buffers, _shot(camera), light or Light(), samples=MSAA)
+
+
+def fragments(buffers: PlantBuffers, camera: Camera) -> int:
+    """Fragments that a client shades where nothing hides anything: overdraw, alpha or not."""
+    return count_fragments(buffers, _shot(camera))
+
+
+def frame_seconds(
+    buffers: PlantBuffers, camera: Camera, light: Light | None = None, repeats: int = 30
+) -> FloatArray:
+    """(repeats,) seconds of frames as `live` draws them, finished one by one and not read back.
+
+    Raises CapabilityError as `live` does.
+    """
+    return time_frames(buffers, _shot(camera), light or Light(), MSAA, repeats)
+
+
+def _shot(camera: Camera) -> Shot:
+    return Shot(camera.view_projection(), camera.target, camera.width, camera.height)
 
 
 def over(picture: Picture, background: npt.ArrayLike) -> ByteArray:
