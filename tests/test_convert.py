@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from itertools import pairwise
 
 import numpy as np
@@ -14,12 +14,14 @@ from vegtool.gl.draw import Light
 from vegtool.gl.upload import PlantBuffers
 from vegtool.growth import sample
 from vegtool.lod import LodChain
+from vegtool.measure.options import MeasureOptions
 from vegtool.measure.pictures import client_plant, live, truth
 from vegtool.measure.views import direction, framed
 from vegtool.plant import Plant
 
 pytestmark = pytest.mark.gl
 OPTIONS = ConvertOptions(billboards=30, levels=3)
+BY_RULE = MeasureOptions(measure="off")
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +31,7 @@ def bush() -> Plant:
 
 @pytest.fixture(scope="module")
 def chain(bush: Plant) -> LodChain:
-    return convert(bush, OPTIONS)
+    return convert(bush, OPTIONS, BY_RULE)
 
 
 def test_a_third_of_the_billboards_at_twice_the_distance(chain: LodChain) -> None:
@@ -65,7 +67,10 @@ def test_the_original_comes_first_and_every_option_is_written_down(
 ) -> None:
     assert chain.levels[0].mesh is bush
     assert chain.options["billboards"] == 30
-    assert ConvertOptions(**chain.options) == OPTIONS
+    names = [item.name for item in fields(ConvertOptions)]
+    assert ConvertOptions(**{name: chain.options[name] for name in names}) == OPTIONS
+    names = [item.name for item in fields(MeasureOptions)]
+    assert MeasureOptions(**{name: chain.options[name] for name in names}) == BY_RULE
 
 
 def test_no_level_costs_more_than_half_of_the_one_before() -> None:
@@ -74,7 +79,7 @@ def test_no_level_costs_more_than_half_of_the_one_before() -> None:
     for double_sided in (True, False):
         materials = tuple(replace(m, double_sided=double_sided) for m in herb.materials)
         plant = replace(herb, materials=materials)
-        triangles = [level.triangles for level in convert(plant, ConvertOptions()).levels]
+        triangles = [level.triangles for level in convert(plant, measure=BY_RULE).levels]
         assert all(2 * b <= a for a, b in pairwise(triangles))
         assert len(triangles) > 1
 
@@ -85,7 +90,7 @@ def test_a_single_triangle_still_gets_a_level(bush: Plant) -> None:
         "triangle", corners, np.tile([0.0, 0, 1], (3, 1)), np.zeros((3, 2)), [[0, 1, 2]], [0],
         bush.materials[:1],
     )  # fmt: skip
-    chain = convert(plant, ConvertOptions(levels=6))
+    chain = convert(plant, ConvertOptions(levels=6), BY_RULE)
     assert len(chain.levels) == 2
     assert chain.levels[1].near_distance_m > 20 * plant.height, "the far one"
 
@@ -125,7 +130,8 @@ def test_every_level_covers_what_the_plant_covers_in_its_colour(
 @pytest.mark.parametrize("method", ["kmeans", "isodata", "branches"])
 @pytest.mark.parametrize("shape", ["auto", "single", "crossed"])
 def test_every_method_and_shape_shows_every_face(bush: Plant, method: str, shape: str) -> None:
-    made = convert(bush, replace(OPTIONS, method=method, shape=shape, levels=1))
+    options = replace(OPTIONS, method=method, shape=shape, levels=1)
+    made = convert(bush, options, BY_RULE)
     level = made.levels[1]
     assert level.billboards is not None
     assert level.atlas is not None
@@ -137,7 +143,7 @@ def test_every_method_and_shape_shows_every_face(bush: Plant, method: str, shape
 
 
 def test_same_seed_same_bytes(bush: Plant, chain: LodChain) -> None:
-    again = convert(bush, OPTIONS)
+    again = convert(bush, OPTIONS, BY_RULE)
     for one, two in zip(chain.levels[1:], again.levels[1:], strict=True):
         assert one.atlas is not None
         assert two.atlas is not None
@@ -149,7 +155,7 @@ def test_a_plant_elsewhere_gives_the_same_levels_elsewhere(bush: Plant, chain: L
     """Georeferenced, 5e6 metres away: positions there are exact to 1e-9 m, so labels may differ
     on ties only; what is compared is the count and the covered area."""
     move = np.array([5e6, 0.0, -5e6])
-    moved = convert(replace(bush, positions=bush.positions + move), OPTIONS)
+    moved = convert(replace(bush, positions=bush.positions + move), OPTIONS, BY_RULE)
     for one, two in zip(chain.levels[1:], moved.levels[1:], strict=True):
         assert one.billboards is not None
         assert two.billboards is not None

@@ -21,6 +21,7 @@ from vegtool.convert import ConvertOptions, convert
 from vegtool.errors import InputError, UsageError, VegtoolError, unknown
 from vegtool.formats import READERS, ReadOptions, read_plant
 from vegtool.lod import LodChain
+from vegtool.measure.options import MeasureOptions
 from vegtool.progress import Progress, silent
 
 if TYPE_CHECKING:
@@ -39,13 +40,15 @@ class Job:
 class Outcome:
     """What came of a job: files and their bytes, a row per level, notes; or the error.
 
-    After a dry run the files are those that would be written.
+    After a dry run the files are those that would be written. misses: where levels are worse than
+    they were to be; the files are written all the same.
     """
 
     job: Job
     files: dict[str, int] = field(default_factory=dict)
     levels: tuple[dict[str, Any], ...] = ()
     notes: tuple[str, ...] = ()
+    misses: tuple[str, ...] = ()
     seconds: float = 0.0
     error: str | None = None
     exit_code: int = 0
@@ -60,6 +63,7 @@ class Task:
     folder: Path
     read: ReadOptions = field(default_factory=ReadOptions)
     convert: ConvertOptions = field(default_factory=ConvertOptions)
+    measure: MeasureOptions = field(default_factory=MeasureOptions)
     force: bool = False
     depth: bool = False
     dry_run: bool = False
@@ -115,6 +119,7 @@ def convert_file(job: Job, task: Task, progress: Progress = silent) -> Outcome:
     """
     from vegtool.formats.atomic import check_free
     from vegtool.formats.gltf import file_names, write_chain
+    from vegtool.measure.chain import misses
     from vegtool.measure.contact_sheet import contact_sheet
 
     start = perf_counter()
@@ -124,10 +129,10 @@ def convert_file(job: Job, task: Task, progress: Progress = silent) -> Outcome:
     names = [*file_names(job.name, 1 + task.convert.levels, task.depth), sheet_name]
     inputs = (job.source, *task.inputs)
     check_free(task.folder, names, task.force, inputs)
-    chain = convert(plant, task.convert, lambda s, f: progress(s, 0.05 + 0.75 * f))
+    chain = convert(plant, task.convert, task.measure, lambda s, f: progress(s, 0.05 + 0.8 * f))
     options = {**asdict(task.read), **chain.options}
     chain = replace(chain, name=job.name, options=options)
-    progress("contact sheet", 0.8)
+    progress("contact sheet", 0.85)
     extra = {sheet_name: contact_sheet(chain)}
     progress("writing", 0.9)
     with TemporaryDirectory() if task.dry_run else nullcontext(task.folder) as folder:
@@ -135,7 +140,9 @@ def convert_file(job: Job, task: Task, progress: Progress = silent) -> Outcome:
         files = {str(task.folder / p.name): p.stat().st_size for p in paths}
     progress("done", 1.0)
     rows = tuple(_row(chain, i) for i in range(len(chain.levels)))
-    return Outcome(job, files, rows, plant.notes, perf_counter() - start)
+    notes = (*plant.notes, *chain.notes)
+    missed = tuple(misses(chain.levels, task.measure))
+    return Outcome(job, files, rows, notes, missed, perf_counter() - start)
 
 
 def convert_files(
@@ -257,12 +264,15 @@ def _outcome(job: Job, task: Task, progress: Progress = silent) -> Outcome:
 
 def _row(chain: LodChain, index: int) -> dict[str, Any]:
     level = chain.levels[index]
+    measured = level.measured
     return {
         "level": index,
         "kind": level.kind,
         "billboards": 0 if level.billboards is None else len(level.billboards),
         "triangles": level.triangles,
         "texels": level.texels,
-        "near_distance_m": round(level.near_distance_m, 4),
+        "switch_distance_m": float(f"{level.near_distance_m:.4g}"),
+        "flip": None if measured is None else round(measured.errors["flip"].mean, 4),
+        "live_flip": None if measured is None else round(measured.live["flip"].mean, 4),
         "seconds": {k: round(v, 4) for k, v in level.seconds.items()},
     }

@@ -22,6 +22,7 @@ from vegtool.convert import ConvertOptions
 from vegtool.errors import BatchError, QualityError, UsageError, VegtoolError, unknown
 from vegtool.flags import flags, read_config
 from vegtool.formats import ReadOptions
+from vegtool.measure.options import MeasureOptions
 from vegtool.report.options import ReportOptions
 
 app = typer.Typer(
@@ -83,6 +84,7 @@ def convert_command(
     ],
     out: Out,
     convert: ConvertOptions,
+    measure: MeasureOptions,
     read: ReadOptions,
     jobs: Annotated[int, typer.Option("-j", "--jobs", help="Files at a time.", min=1)] = 1,
     depth: Annotated[bool, typer.Option("--depth", help="Write depth textures too.")] = False,
@@ -107,7 +109,8 @@ def convert_command(
 
     console = Console(-1 if quiet else verbose, json)
     todo = find_jobs(inputs)
-    task = Task(out, read, convert, force, depth, dry_run, tuple(job.source for job in todo))
+    sources = tuple(job.source for job in todo)
+    task = Task(out, read, convert, measure, force, depth, dry_run, sources)
     outcomes = []
     with console.bar("convert") as progress:
         for outcome in convert_files(todo, task, jobs, _file_progress(todo, progress)):
@@ -131,6 +134,9 @@ def convert_command(
         names = ", ".join(str(o.job.source) for o in failed)
         kind = BatchError if len(failed) < len(outcomes) else VegtoolError
         raise kind(f"{len(failed)} of {len(outcomes)} inputs failed: {names}")
+    missed = [f"{o.job.name}: {sentence}" for o in outcomes for sentence in o.misses]
+    if missed:
+        raise QualityError("; ".join(missed))
 
 
 @app.command("report")
@@ -325,6 +331,7 @@ def _as_json(outcome: Any) -> dict[str, Any]:
         "files": outcome.files,
         "levels": list(outcome.levels),
         "notes": list(outcome.notes),
+        "misses": list(outcome.misses),
         "seconds": round(outcome.seconds, 3),
         "error": outcome.error,
     }
@@ -336,7 +343,7 @@ def _summary(outcomes: list[Any], dry_run: bool) -> str:
         if outcome.error:
             continue
         shown = [{k: v for k, v in row.items() if k != "seconds"} for row in outcome.levels]
-        rows = [[f"{v:,}" if isinstance(v, int) else v for v in row.values()] for row in shown]
+        rows = [[_cell(v) for v in row.values()] for row in shown]
         head = [name.replace("_", " ") for name in shown[0]]
         total = human_bytes(sum(outcome.files.values()))
         title = f"{outcome.job.name}: {outcome.seconds:.1f} s, {total}"
@@ -344,6 +351,13 @@ def _summary(outcomes: list[Any], dry_run: bool) -> str:
         files = [f"  {path}  {human_bytes(size)}" for path, size in outcome.files.items()]
         blocks.append("\n".join([title, table(head, rows), *files]))
     return "\n\n".join(blocks)
+
+
+def _cell(value: Any) -> str:
+    """A figure as a person reads it; what there is none of is empty."""
+    if value is None:
+        return ""
+    return f"{value:,}" if isinstance(value, int) else str(value)
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -18,6 +18,7 @@ from vegtool.boxes.options import BoxOptions, Shape
 from vegtool.clustering import METHODS, ClusterOptions
 from vegtool.errors import UsageError
 from vegtool.lod import Display, Level, LodChain
+from vegtool.measure.options import MeasureOptions
 from vegtool.options import check_limits, option
 from vegtool.plant import Plant
 from vegtool.progress import Progress, silent
@@ -38,6 +39,9 @@ large as the screen."""
 
 MOST_OF_PREVIOUS = 0.5
 """A level has at most this share of the triangles of the one before it, or it is left out."""
+
+MAKING = 0.4
+"""Share of the time that goes into levels that are measured, about."""
 
 TRIANGLES_PER_BILLBOARD = 2
 """At least: four where both sides have pictures of their own."""
@@ -96,33 +100,48 @@ class ConvertOptions:
 
 
 def convert(
-    plant: Plant, options: ConvertOptions | None = None, progress: Progress = silent
+    plant: Plant,
+    options: ConvertOptions | None = None,
+    measure: MeasureOptions | None = None,
+    progress: Progress = silent,
 ) -> LodChain:
     """Make the chain of levels of one plant.
 
     levels[0] is the plant itself, the others are billboards: one at least, and no more than save
-    triangles. Raises UsageError for options out of
-    range and CapabilityError where nothing can draw.
+    triangles and may be used somewhere. Raises UsageError for options out of range, QualityError
+    where no level keeps to `measure.max_error`, CapabilityError where nothing can draw.
     """
     from vegtool.baking.bake import PlantBuffers
+    from vegtool.measure.chain import with_distances
 
-    options = options or ConvertOptions()
+    options, measure = options or ConvertOptions(), measure or MeasureOptions()
     check_limits(options)
+    check_limits(measure)
+    making = 1.0 if measure.measure == "off" else MAKING
     levels = [Level("mesh", mesh=plant, geometric_error_m=(0.0, 0.0))]
     counts = billboard_counts(plant, options)
     with PlantBuffers(plant) as buffers:
         for index, count in enumerate(counts):
 
             def report(stage: str, fraction: float, index: int = index) -> None:
-                progress(f"LOD{index + 1}: {stage}", (index + fraction) / len(counts))
+                done = making * (index + fraction) / len(counts)
+                progress(f"LOD{index + 1}: {stage}", done)
 
             near = distance_of(plant, options.display, near_pixels(count))
             level = billboard_level(buffers, options, count, near, report)
             saves = level.triangles <= MOST_OF_PREVIOUS * levels[-1].triangles
             if saves or (index == len(counts) - 1 and len(levels) == 1):
                 levels.append(level)
+    kept, notes = with_distances(
+        plant,
+        levels[1:],
+        measure,
+        options.display,
+        lambda stage, fraction: progress(stage, making + (1 - making) * fraction),
+    )
     progress("levels", 1.0)
-    return LodChain(plant.name, tuple(levels), options.display, options.seed, asdict(options))
+    told = {**asdict(options), **asdict(measure)}
+    return LodChain(plant.name, (levels[0], *kept), options.display, options.seed, told, notes)
 
 
 def billboard_level(
@@ -186,7 +205,7 @@ def near_pixels(count: int) -> float:
     A third of the billboards are for half the size, until measuring states the distance.
     """
     pixels, billboards = NEAR_PIXELS
-    size = pixels * (count / billboards) ** (log(2) / log(LEVEL_RATIO))
+    size = float(pixels * (count / billboards) ** (log(2) / log(LEVEL_RATIO)))
     return min(max(size, NEAR_LIMITS[0]), NEAR_LIMITS[1])
 
 

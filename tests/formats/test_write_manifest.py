@@ -12,8 +12,9 @@ import pytest
 from written import small_chain
 
 from vegtool.errors import InputError
-from vegtool.formats.gltf import write_chain
-from vegtool.formats.manifest import FADE_FRACTION, LevelFile, manifest, read_manifest, schema
+from vegtool.formats.gltf import screen_coverage, write_chain
+from vegtool.formats.manifest import LevelFile, manifest, read_manifest, schema
+from vegtool.lod import FADE_FRACTION, LodChain, Measured, Spread
 
 FILES = [LevelFile("tree.glb", 300), LevelFile("tree_LOD1.glb", 200), LevelFile("tree_LOD2.glb", 9)]
 
@@ -44,12 +45,52 @@ def test_levels_say_what_is_drawn_and_from_where():
     assert second["triangles"] == 4  # one billboard, front and back
     assert first["texels"] == 2 * 16 * 32
     assert (first["switch_distance_m"], second["switch_distance_m"]) == (10.0, 20.0)
-    assert first["fade_end_m"] == 10.0
-    assert first["fade_start_m"] == (1 - FADE_FRACTION) * 10.0
+    assert first["fade_start_m"] == 10.0, "never shown nearer"
+    assert first["fade_end_m"] == pytest.approx((1 + FADE_FRACTION) * 10.0)
+    assert first["hysteresis_m"] == pytest.approx(FADE_FRACTION * 10.0)
     # The plant is 1 m high; the image shows 2 * 10 m * tan(30 degrees) at the switch distance.
     assert first["screen_height_fraction"] == pytest.approx(1 / (20 * tan(radians(30))))
     assert first["geometric_error_m"] == {"max": 0.5, "p95": 0.25}
     assert first["measured"] is None
+
+
+def measured_chain(held_out: Spread | None = None) -> LodChain:
+    """The small chain, its levels measured."""
+    errors = {
+        "flip": Spread(0.123456, 0.01, 0.1, 0.15),
+        "ssim": Spread(0.7, 0.01, 0.6, 0.8),
+        "psnr": Spread(30.0, 1.0, 29.0, 31.0),
+        "coverage_bias": Spread(-1e-9, 0.01, -0.02, 0.02),
+        "color_bias": Spread(0.01, 0.01, -0.02, 0.02),
+    }
+    found = Measured(123.456, "ground", 6, errors, errors, held_out)
+    chain = small_chain()
+    levels = [replace(level, measured=found) for level in chain.levels[1:]]
+    return replace(chain, levels=(chain.levels[0], *levels))
+
+
+def test_what_was_measured_is_stated_with_its_spread_and_rounded():
+    values = manifest(measured_chain(), FILES)
+    jsonschema.validate(values, schema())
+    measured = values["levels"][1]["measured"]
+    assert measured["flip"] == {"mean": 0.1235, "sd": 0.01, "low": 0.1, "high": 0.15}
+    assert measured["live"]["flip"] == measured["flip"]
+    assert str(measured["coverage_bias"]["mean"]) == "0.0"
+    assert (measured["pixels"], measured["views"]) == (123.5, {"kind": "ground", "count": 6})
+    assert "psnr" not in measured
+    assert "held_out" not in measured
+
+
+def test_views_that_were_held_out_are_stated_where_there_were_some():
+    values = manifest(measured_chain(Spread(0.13, 0.01, 0.1, 0.16)), FILES)
+    jsonschema.validate(values, schema())
+    assert values["levels"][1]["measured"]["held_out"]["flip"]["mean"] == 0.13
+
+
+def test_clients_of_msft_lod_switch_at_the_same_distances():
+    values = manifest(small_chain(), FILES)
+    shares = [level["screen_height_fraction"] for level in values["levels"][1:]]
+    assert screen_coverage(small_chain())[:-1] == pytest.approx(shares)
 
 
 def test_a_manifest_needs_one_file_per_level():

@@ -14,6 +14,7 @@ from vegtool.gl.draw import Light
 from vegtool.gl.upload import PlantBuffers
 from vegtool.growth import sample
 from vegtool.measure.contact_sheet import contact_sheet
+from vegtool.measure.options import MeasureOptions
 from vegtool.measure.pictures import live, over, truth
 from vegtool.measure.views import Camera, direction
 from vegtool.plant import Material, Plant, Texture
@@ -78,6 +79,7 @@ def test_half_the_light_over_white_is_not_half_the_grey() -> None:
 
 
 def test_contact_sheet_is_the_one_that_was_looked_at() -> None:
-    chain = convert(sample("broadleaf", 4000), ConvertOptions(billboards=64, levels=2))
+    options = ConvertOptions(billboards=512, levels=2)
+    chain = convert(sample("broadleaf", 4000), options, MeasureOptions(measure="off"))
     sheet = np.asarray(Image.open(BytesIO(contact_sheet(chain))).convert("RGB"))
     assert_golden("contact_sheet_broadleaf", sheet)

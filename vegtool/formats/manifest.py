@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cache
 from importlib import resources
 from math import radians, tan
@@ -16,12 +16,12 @@ from typing import Any
 
 import vegtool
 from vegtool.errors import InputError
-from vegtool.lod import Level, LodChain
+from vegtool.lod import FADE_FRACTION, Level, LodChain, Measured, Spread
 
 VERSION = 1  # of the schema: one more when a reader of the last one would misread the file
-FADE_FRACTION = (
-    0.15  # of the switch distance: a crossfade starts that much before it and ends there
-)
+DECIMALS = 4  # of an error
+STATED = ("flip", "ssim", "coverage_bias", "color_bias")
+"""Metrics that a manifest tells of each level."""
 
 _AGAIN = "Convert the plant again."
 _TYPES: dict[str, tuple[type, ...]] = {
@@ -48,8 +48,8 @@ def manifest(chain: LodChain, files: Sequence[LevelFile]) -> dict[str, Any]:
     """The manifest of a chain whose levels were written to `files`, one for each level, in order.
 
     The first is the combined file, which shows the original wherever MSFT_lod is not read.
-    Distances are for `chain.display`; measured errors are null until they are measured. The same
-    chain gives the same manifest: no time, no path.
+    Distances are for `chain.display`; errors are null where they were not measured. The same chain
+    gives the same manifest: no time, no path.
     """
     if len(files) != len(chain.levels):
         raise ValueError(f"manifest: {len(chain.levels)} levels need as many files: {len(files)}")
@@ -71,6 +71,7 @@ def manifest(chain: LodChain, files: Sequence[LevelFile]) -> dict[str, Any]:
 
 def _level(chain: LodChain, level: Level, file: LevelFile) -> dict[str, Any]:
     distance = level.near_distance_m
+    fade = FADE_FRACTION * distance
     error = level.geometric_error_m
     return {
         "file": file.name,
@@ -80,12 +81,34 @@ def _level(chain: LodChain, level: Level, file: LevelFile) -> dict[str, Any]:
         "texels": level.texels,
         "bytes": file.bytes,
         "switch_distance_m": distance,
-        "fade_start_m": (1 - FADE_FRACTION) * distance,
-        "fade_end_m": distance,
+        "fade_start_m": distance,
+        "fade_end_m": distance + fade,
+        "hysteresis_m": fade,
         "screen_height_fraction": screen_height_fraction(chain, distance) if distance else None,
         "geometric_error_m": None if error is None else {"max": error[0], "p95": error[1]},
-        "measured": None,
+        "measured": None if level.measured is None else _measured(level.measured),
         **({"depth": file.depth} if file.depth else {}),
+    }
+
+
+def _measured(measured: Measured) -> dict[str, Any]:
+    """The errors at the switch distance."""
+    held_out = measured.held_out
+    return {
+        "pixels": float(f"{measured.pixels:.4g}"),
+        "views": {"kind": measured.kind, "count": measured.count},
+        **_spreads(measured.errors),
+        "live": _spreads(measured.live),
+        **({} if held_out is None else {"held_out": _spreads({"flip": held_out})}),
+    }
+
+
+def _spreads(errors: dict[str, Spread]) -> dict[str, dict[str, float]]:
+    """The metrics of STATED, rounded: more digits than the views vouch for are noise."""
+    return {
+        name: {key: round(value, DECIMALS) + 0.0 for key, value in asdict(errors[name]).items()}
+        for name in STATED
+        if name in errors
     }
 
 

@@ -1,6 +1,6 @@
 """One picture of a chain: the original above, the levels below, where they are meant to be used.
 
-A column per level. Both pictures of a column are taken from the level's near distance and shown
+A column per level. Both pictures of a column are taken from the level's switch distance and shown
 magnified (nearest texel) to the same size, so that a person can compare pixel by pixel.
 """
 
@@ -20,7 +20,7 @@ from vegtool.measure.views import direction, framed
 
 CELL = 360
 """Pixels of a picture's side on the sheet; small pictures are magnified to fill it."""
-MARGIN, CAPTION = 12, 58
+MARGIN, LINE = 12, 18
 BACKGROUND = (0.19, 0.27, 0.36)
 """Linear: a light overcast sky, against which both light and dark leaves stand out."""
 PAPER, INK, FAINT = (250, 250, 248), (30, 34, 38), (110, 116, 122)
@@ -41,19 +41,20 @@ def contact_sheet(chain: LodChain) -> bytes:
                     _cropped(truth(original, camera, supersample=4), live(buffers, camera))
                 )
     width = MARGIN + len(levels) * (CELL + MARGIN)
-    height = 2 * (CELL + MARGIN) + MARGIN + CAPTION + 34
+    captions = [_caption(level, number) for number, level in enumerate(levels, start=1)]
+    height = 2 * (CELL + MARGIN) + MARGIN + LINE * max(map(len, captions)) + 38
     sheet = Image.new("RGB", (width, height), PAPER)
     pen = ImageDraw.Draw(sheet)
     title, small = ImageFont.load_default(18), ImageFont.load_default(13)
     heading = f"{chain.name}   {len(plant.faces):,} triangles"
     pen.text((MARGIN, MARGIN), heading, fill=INK, font=title)
-    for column, (level, pictures) in enumerate(zip(levels, cells, strict=True)):
+    for column, (caption, pictures) in enumerate(zip(captions, cells, strict=True)):
         x, y = MARGIN + column * (CELL + MARGIN), MARGIN + 34
         for picture in pictures:
             sheet.paste(Image.fromarray(_magnified(over(picture, BACKGROUND))), (x, y))
             y += CELL + MARGIN
-        for row, (text, colour) in enumerate(_caption(level, column + 1)):
-            pen.text((x, y + 18 * row), text, fill=colour, font=small)
+        for row, (text, colour) in enumerate(caption):
+            pen.text((x, y + LINE * row), text, fill=colour, font=small)
     stream = BytesIO()
     sheet.save(stream, "PNG", compress_level=4)
     return stream.getvalue()
@@ -86,8 +87,12 @@ def _magnified(picture: ByteArray) -> ByteArray:
 def _caption(level: Level, number: int) -> list[tuple[str, tuple[int, int, int]]]:
     assert level.billboards is not None and level.atlas is not None
     height, width = level.atlas.color.shape[:2]
-    return [
+    lines = [
         (f"LOD{number}, from {level.near_distance_m:.3g} m", INK),
         (f"{len(level.billboards):,} billboards, {level.triangles:,} triangles", FAINT),
         (f"atlas {width} x {height}", FAINT),
     ]
+    if level.measured is not None:
+        error, live = level.measured.errors["flip"].mean, level.measured.live["flip"].mean
+        lines.append((f"error {error:.3f}, of the original live {live:.3f} (FLIP)", FAINT))
+    return lines

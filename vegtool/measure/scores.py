@@ -78,18 +78,7 @@ def truths(
     left. buffers: the plant's, without mipmaps, where there are some.
     """
     display = display or Display()
-    extent = float((plant.bounds[1] - plant.bounds[0]).max())
-    if not extent > 0:
-        raise UsageError(f"{plant.source or plant.name}: expected a plant with an extent")
-    sizes = np.array(sorted(set(pixels), reverse=True), dtype=np.float64)
-    distances = np.array([display.distance_m(size / extent) for size in sizes])
-    seen = distances > CLOSEST * plant.radius
-    if not seen.any():
-        raise UsageError(
-            f"--fov {display.fov_y_deg:g}: at no size from {sizes[0]:g} to {sizes[-1]:g} pixels is "
-            "the eye outside the plant; use a narrower field of view or a larger --image-height"
-        )
-    sizes, distances = sizes[seen], distances[seen]
+    sizes, distances = outside(plant, pixels, display)
     cameras = tuple(
         tuple(around(plant.positions, view.direction, distance, display) for view in views)
         for distance in distances
@@ -114,17 +103,41 @@ def truths(
     return Truths(plant, display, tuple(views), sizes, distances, cameras, rows)
 
 
+def outside(
+    plant: Plant, pixels: Sequence[float], display: Display
+) -> tuple[FloatArray, FloatArray]:
+    """Those sizes on the screen, descending, at which the eye is outside the plant; and the
+    distances, metres, that give them. Raises UsageError where there are none."""
+    extent = float((plant.bounds[1] - plant.bounds[0]).max())
+    if not extent > 0:
+        raise UsageError(f"{plant.source or plant.name}: expected a plant with an extent")
+    sizes = np.array(sorted(set(pixels), reverse=True), dtype=np.float64)
+    distances = np.array([display.distance_m(size / extent) for size in sizes])
+    seen = distances > CLOSEST * plant.radius
+    if not seen.any():
+        raise UsageError(
+            f"--fov {display.fov_y_deg:g}: at no size from {sizes[0]:g} to {sizes[-1]:g} pixels is "
+            "the eye outside the plant; use a narrower field of view or a larger --image-height"
+        )
+    return sizes[seen], distances[seen]
+
+
 def scores(
-    truths: Truths, level: Level | Callable[[View], Level], progress: Progress = silent
+    truths: Truths,
+    level: Level | PlantBuffers | Callable[[View], Level],
+    progress: Progress = silent,
 ) -> Scores:
     """Draw a level live (measure/pictures.py) from every camera of the truths, and score it.
 
-    level: or a function that gives the level for a view, for those that depend on it.
+    level: or its `client_plant` as buffers with mipmaps; or a function that gives the level for a
+    view, for those that depend on it.
     """
     shape = len(truths.pixels), len(truths.views)
     uploaded: dict[Level, PlantBuffers] = {}
 
     def buffers_for(view: View) -> PlantBuffers:
+        if isinstance(level, PlantBuffers):
+            return level
         shown = level if isinstance(level, Level) else level(view)
         if shown not in uploaded:
             uploaded[shown] = PlantBuffers(client_plant(shown), mipmaps=True)
