@@ -21,7 +21,7 @@ ZERO = np.zeros(2, dtype=np.int32)
 @pytest.fixture
 def alpha_as_baked(monkeypatch):
     """Alpha is the coverage itself, before baking/coverage.py fits it to the alpha test."""
-    monkeypatch.setattr("vegtool.baking.bake.coverage_kept", lambda alpha, rects: alpha)
+    monkeypatch.setattr("vegtool.baking.bake.coverage_kept", lambda alpha, *_: alpha)
 
 
 def cut(atlas, index=0, which="front"):
@@ -290,11 +290,11 @@ def test_geometry_outside_a_rectangle_does_not_reach_the_neighbours():
     plant = quads([[0, 0, 0], [9, 0, 0]], half=[3.0, 1.0])
     board = billboards([[0, 0, 0], [9, 0, 0]], 1.0)
     atlas = bake(plant, np.array([0, 0, 1, 1]), board, 8.0).atlas
-    inside = np.zeros(atlas.color.shape[:2], dtype=bool)
+    depth = np.zeros(atlas.depth.shape, np.uint16)
     for x, y, w, h in atlas.front:
-        inside[y : y + h, x : x + w] = True
-    assert (atlas.color[~inside][:, 3] == 0).all()
-    assert (atlas.color[inside][:, 3] == 255).all()
+        depth[y : y + h, x : x + w] = 32768
+        assert (atlas.color[y : y + h, x : x + w, 3] == 255).all()
+    assert np.array_equal(atlas.depth, depth)
 
 
 def test_crossed_planes_each_show_the_whole_cluster():
@@ -308,7 +308,10 @@ def test_flat_and_line_like_clusters_bake_without_complaint():
     plant = quads([[0, 0, 0]])
     for half_size, half_depth in (((1.0, 1.0), 0.0), ((1.0, 0.0), 0.0), ((0.0, 0.0), 0.0)):
         baked = bake(plant, ZERO, billboards([[0, 0, 0]], half_size, half_depth), 4.0)
-        assert (baked.atlas.depth[baked.atlas.color[..., 3] > 0] == 32768).all()
+        (x, y, w, h), *_ = baked.atlas.front
+        picture = np.s_[y : y + h, x : x + w]
+        assert (baked.atlas.color[picture][..., 3] == 255).all()
+        assert (baked.atlas.depth[picture] == 32768).all()
 
 
 def test_density_is_lowered_to_fit_the_largest_texture():
@@ -344,3 +347,11 @@ def test_sources_much_finer_than_the_samples_keep_their_mean(alpha_as_baked):
     color, _, _ = cut(baked.atlas)
     assert color[..., 3].mean() / 255 == pytest.approx(0.3, abs=0.03)
     assert np.abs(color[color[..., 3] > 0][:, :3] - [90, 140, 60]).max() <= 1
+
+
+@pytest.mark.parametrize("texels_per_metre", [1e5, 1e12])
+def test_a_density_far_beyond_the_texture_is_lowered_to_what_fits(texels_per_metre: float) -> None:
+    """The longest side takes all that there is, whatever was asked for."""
+    packing, density = fit(np.array([[1.0, 1e-6]]), texels_per_metre, 2, 1024)
+    assert packing.width == 1024
+    assert density == pytest.approx(1020 / 2)

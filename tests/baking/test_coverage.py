@@ -48,6 +48,17 @@ def test_each_picture_by_itself_and_nothing_outside() -> None:
     np.testing.assert_array_equal(kept[4:, :4], alpha[4:, :4])
 
 
+def test_gutters_repeat_the_edge() -> None:
+    """A twig one texel wide fills its picture: at mip 1 too, where its gutter is half of a block,
+    so nothing has to change for as much to pass as is covered."""
+    alpha = np.zeros((16, 16), np.uint8)
+    alpha[5:11, 6] = 255
+    kept = coverage_kept(alpha, np.array([[6, 5, 1, 6]], np.int32), gutter=2)
+    expected = np.zeros_like(alpha)
+    expected[3:13, 4:9] = 255
+    np.testing.assert_array_equal(kept, expected)
+
+
 def test_full_texels_stay_full_even_where_they_alone_pass() -> None:
     """At a threshold of 255 nothing below passes, and what is full is not lowered to the limit."""
     table = tables(np.array([255, 254, 1]))

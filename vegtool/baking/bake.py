@@ -140,13 +140,15 @@ def fit(
     half_size: FloatArray, texels_per_metre: float, gutter: int, max_texture: int
 ) -> tuple[Packing, float]:
     """Pictures in whole texels, packed; the density is lowered until max_texture holds them."""
-    density = texels_per_metre
+    density, longest = texels_per_metre, max_texture - 2 * gutter
     while True:
-        sizes = np.maximum(1, np.rint(2 * density * half_size)).astype(np.int32)
-        area = float(np.prod(sizes.astype(np.float64) + 2 * gutter, axis=1).sum())
-        excess = area / max_texture**2
-        if excess <= 1 and int(sizes.max()) + 2 * gutter <= max_texture:
-            packing = pack(sizes, gutter, max_texture)
+        sizes = np.maximum(1, np.rint(2 * density * half_size))  # integers too large for int32
+        if sizes.max() > max(longest, 1):
+            density *= longest / sizes.max()
+            continue
+        excess = float(np.prod(sizes + 2 * gutter, axis=1).sum()) / max_texture**2
+        if excess <= 1:
+            packing = pack(sizes.astype(np.int32), gutter, max_texture)
             excess = max(packing.width, packing.height) / max_texture
             if excess <= 1:
                 return packing, density
@@ -170,5 +172,5 @@ def dilated(drawn: Drawn, packing: Packing) -> tuple[ByteArray, ByteArray]:
     covered = drawn.color[..., 3] > 0
     nearest = nearest_covered(covered, packing.rect, packing.gutter)
     color = drawn.color.reshape(-1, 4)[nearest]
-    color[..., 3] = coverage_kept(drawn.color[..., 3], packing.rect)
+    color[..., 3] = coverage_kept(drawn.color[..., 3], packing.rect, packing.gutter)
     return color, drawn.normal.reshape(-1, 3)[nearest]
