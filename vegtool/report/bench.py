@@ -76,7 +76,6 @@ def measured(
         _floats(bench.truths.pixels),
         _floats(bench.truths.distance_m),
         {metric: tuple(_floats(v) for v in values) for metric, values in found.values.items()},
-        note=made.note,
     )
     if made.shown is level:
         row = _with_bounds(row, bench, level)

@@ -11,7 +11,7 @@ from importlib import resources
 from vegtool.lod import Spread
 from vegtool.measure.metrics import METRICS
 from vegtool.report.plots import COSTS, error_against, error_against_distance, look, svg
-from vegtool.report.rows import LIVE, PlantReport, Report, Row
+from vegtool.report.rows import EMULATED, LIVE, PlantReport, Report, Row
 from vegtool.report.summary import Point, families, medians, points
 
 SIGNED = ("coverage_bias", "color_bias")
@@ -81,6 +81,7 @@ def _all_plants(report: Report) -> str:
     names = ", ".join(p.name for p in report.plants)
     return (
         f"<p>Medians over {len(report.plants)} plants: {escape(names)}.</p>"
+        + _closest(found)
         + _plots(found, f"median of {len(report.plants)} plants")
         + _tables(found)
     )
@@ -93,6 +94,7 @@ def _plant(plant: PlantReport) -> str:
         f'<p class="facts">{plant.triangles:,} triangles, {plant.extent_m:.3g} metres. '
         f"{escape(plant.source)}</p>"
         + (f"<ul>{notes}</ul>" if notes else "")
+        + _closest(found)
         + _strips(plant)
         + _plots(found, plant.name)
         + _tables(found)
@@ -111,10 +113,35 @@ def _plots(found: Sequence[Point], of: str) -> str:
     for cost in COSTS:
         title = titles[cost.name]
         drawn = error_against(found, cost, f"{title}: {of}")
-        figures.append(f"<figure>{svg(drawn, escape(f'{title}: {of}', quote=True))}</figure>")
+        figures.append(
+            f'<figure class="plot">{svg(drawn, escape(f"{title}: {of}", quote=True))}</figure>'
+        )
     title = f"Error against distance: {of}"
     far = svg(error_against_distance(found, title), escape(title, quote=True))
-    return f'<div class="plots">{"".join(figures)}</div><figure>{far}</figure>'
+    return "".join(figures) + f'<figure class="plot">{far}</figure>'
+
+
+def _closest(found: Sequence[Point]) -> str:
+    """At each size the row that comes closest to the truth, beside the live original."""
+    live = next(p for p in found if p.name == LIVE)
+    rivals = [p for p in found if p is not live and p.family not in EMULATED]
+    if not rivals:
+        return ""
+    lines = []
+    for i, size in enumerate(live.pixels):
+        best = min(rivals, key=lambda p: p.errors["flip"][i].mean)
+        error, own = best.errors["flip"][i], live.errors["flip"][i]
+        lines.append(
+            [
+                f"{size:g} pixels",
+                best.name,
+                f"{error.mean:.3f} ± {error.sd:.3f}",
+                f"{own.mean:.3f} ± {own.sd:.3f}",
+                f"{best.triangles:,.0f} of {live.triangles:,.0f}",
+            ]
+        )
+    head = ["height", "closest to the truth", "its FLIP", "live original's", "triangles"]
+    return _words_table(head, lines)
 
 
 def _tables(found: Sequence[Point]) -> str:
@@ -226,7 +253,7 @@ def _table(found: Sequence[Point], columns: Sequence[Column], caption: str) -> s
             f'<tr{kind}><td data-value="{escape(point.name)}">{name}</td>{"".join(cells)}</tr>'
         )
     return (
-        f'<div class="scroll"><table class="sortable"><caption>{escape(caption)}</caption><thead>'
+        f'<p class="faint">{escape(caption)}</p><div class="scroll"><table class="sortable"><thead>'
         f"<tr><th scope='col'>row</th>{head}</tr></thead><tbody>{''.join(body)}</tbody>"
         "</table></div>"
     )
@@ -282,6 +309,7 @@ def _strips(plant: PlantReport) -> str:
 
 
 def _strip(plant: PlantReport, size: int) -> str:
+    rows = {row.name: row for row in plant.rows}
     shown = []
     for name, kept in plant.pictures.items():
         if size in kept:
@@ -290,7 +318,11 @@ def _strip(plant: PlantReport, size: int) -> str:
                 f'{b64encode(image).decode()}">'
                 for image in kept[size]
             )
-            shown.append(f"<figure>{images}<figcaption>{escape(name)}</figcaption></figure>")
+            facts = (
+                f" <small>{rows[name].cost.triangles:,} triangles</small>" if name in rows else ""
+            )
+            caption = f"<figcaption>{escape(name)}{facts}</figcaption>"
+            shown.append(f"<figure>{caption}{images}</figure>")
     return (
         f"<h3>{size} pixels high, magnified</h3><div class='strip'>{''.join(shown)}</div>"
         "<p class='faint'>Below each picture its difference from the truth by FLIP, from black "

@@ -12,12 +12,11 @@ import numpy as np
 from matplotlib import colormaps
 from PIL import Image
 
-from vegtool.arrays import ByteArray
 from vegtool.convert import distance_of
 from vegtool.gl.draw import Light
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Display, Level
-from vegtool.measure.flip import difference, perceived
+from vegtool.measure.flip import Float32s, difference, perceived
 from vegtool.measure.metrics import BACKGROUND, Picture
 from vegtool.measure.pictures import client_plant, live, over, truth
 from vegtool.measure.views import CLOSEST, Camera, View, around, direction
@@ -68,7 +67,7 @@ def _nearest(size: int, family: str, among: Sequence[Entry]) -> Entry:
 
 def of_truth(scene: Scene) -> Pictures:
     """The truth, as PNGs by size."""
-    return {size: (_png(over(t, BACKGROUND)),) for size, t in scene.truths.items()}
+    return {size: (_png(Image.fromarray(over(t, BACKGROUND))),) for size, t in scene.truths.items()}
 
 
 def of_shown(shown: Shown, scene: Scene, sizes: Sequence[int]) -> Pictures:
@@ -79,8 +78,8 @@ def of_shown(shown: Shown, scene: Scene, sizes: Sequence[int]) -> Pictures:
         for size in (s for s in sizes if s in scene.cameras):
             picture = live(buffers, scene.cameras[size], Light(direction=VIEW.sun))
             error = difference(*(perceived(_linear(p)) for p in (scene.truths[size], picture)))
-            colours = colormaps["magma"](error, bytes=True)[..., :3]
-            found[size] = (_png(over(picture, BACKGROUND)), _png(colours))
+            shown_over = Image.fromarray(over(picture, BACKGROUND))
+            found[size] = (_png(shown_over), _png(_error_map(error)))
     return found
 
 
@@ -89,7 +88,15 @@ def _linear(picture: Picture) -> Picture:
     return np.asarray(np.clip(picture[..., :3] + (1 - picture[..., 3:]) * BACKGROUND, 0, 1))
 
 
-def _png(picture: ByteArray) -> bytes:
+def _error_map(error: Float32s) -> Image.Image:
+    """Errors (h, w), 0 to 1, from black to yellow."""
+    image = Image.fromarray((255 * error + 0.5).astype(np.uint8), "P")
+    palette = colormaps["magma"](np.arange(256), bytes=True)[:, :3]
+    image.putpalette(palette.tobytes())
+    return image
+
+
+def _png(image: Image.Image) -> bytes:
     stream = BytesIO()
-    Image.fromarray(picture).save(stream, "PNG", compress_level=6)
+    image.save(stream, "PNG", compress_level=9)
     return stream.getvalue()

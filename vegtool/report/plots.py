@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from hashlib import sha256
 from io import BytesIO
 from typing import Any
 
@@ -21,6 +22,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from vegtool.measure.metrics import METRICS
+from vegtool.report.labels import LEFT, Labels, Line
+from vegtool.report.rows import EMULATED, LIVE
 from vegtool.report.summary import Point, families, pareto
 
 SIZES = (200.0, 50.0)
@@ -28,6 +31,7 @@ SIZES = (200.0, 50.0)
 INK, FAINT, LINE, PAPER = "#1f2429", "#626a71", "#d5d9dc", "#ffffff"
 IN_PAGE = {INK: "var(--ink)", FAINT: "var(--faint)", LINE: "var(--line)", PAPER: "var(--paper)"}
 """What an SVG takes from its page instead."""
+DASHED = (0, (4, 3))
 LOOKS: dict[str, tuple[str, str]] = {
     "branches": ("#009e73", "o"),
     "isodata": ("#0072b2", "s"),
@@ -90,94 +94,146 @@ def error_against(points: Sequence[Point], cost: Cost, title: str, metric: str =
     with rc_context(STYLE):
         figure = Figure(figsize=(4.9 * len(sizes), 4.1), layout="constrained")
         panels = figure.subplots(1, len(sizes), sharey=True, squeeze=False)[0]
-        ends = []
-        for panel, size in zip(panels, sizes, strict=True):
-            ends.append(_panel(panel, [p for p in points if size in p.pixels], cost, metric, size))
-            panel.set_title(f"{size:g} pixels high")
+        for axes, size in zip(panels, sizes, strict=True):
+            _axis(axes, cost, [getattr(p, cost.name) for p in points])
+            axes.set_title(f"{size:g} pixels high")
+        drawn = [
+            _panel(axes, [p for p in points if size in p.pixels], cost, metric, size)
+            for axes, size in zip(panels, sizes, strict=True)
+        ]
+        panels[0].set_ylim(bottom=0)
         panels[0].set_ylabel(_error_label(points, metric))
-        figure.suptitle(title, x=0.01, ha="left", fontsize=11)
-        figure.draw_without_rendering()  # places the panels, so that names can keep apart
-        for panel, end in zip(panels, ends, strict=True):
-            _name(panel, end)
+        _framed(figure, title, "band: Pareto front, with budgets; dashed: the original, live; "
+                "whiskers: standard deviation")  # fmt: skip
+        for axes, lines in zip(panels, drawn, strict=True):
+            _words(axes, lines)
     return figure
 
 
-End = tuple[float, float, str, str]
-"""Of a family's line: where it ends, its name, its colour."""
+@dataclass(frozen=True)
+class _Lines:
+    """What a panel shows: by family its points, the front's points and budgets, and the rest."""
+
+    families: dict[str, Line]
+    front: list[tuple[int, Line]]
+    others: list[Line]
 
 
-def _panel(axes: Axes, points: list[Point], cost: Cost, metric: str, size: float) -> list[End]:
-    def at(point: Point) -> tuple[float, float]:
-        error = point.errors[metric][point.pixels.index(size)].mean
-        return float(getattr(point, cost.name)), error
-
-    placed = {p.name: at(p) for p in points if at(p)[0] > 0}
-    ends: list[End] = []
-    front = pareto(*np.array(list(placed.values())).T) if placed else []
-    best = np.array(list(placed.values()))[front].reshape(-1, 2)
-    axes.plot(*best.T, color=LINE, linewidth=7, solid_capstyle="round", zorder=1)
-    for family in families(points):
+def _panel(axes: Axes, points: list[Point], cost: Cost, metric: str, size: float) -> _Lines:
+    """Draw a panel. What costs nothing has no place on its axis."""
+    errors = {p.name: p.errors[metric][p.pixels.index(size)] for p in points}
+    at = {p.name: (float(getattr(p, cost.name)), errors[p.name].mean) for p in points}
+    placed = [p for p in points if at[p.name][0] > 0]
+    own_lines: dict[str, Line] = {}
+    for family in families(placed):
         color, marker = look(family, families(points))
-        own = sorted((p for p in points if p.family == family and p.name in placed),
-                     key=lambda p: placed[p.name][0])  # fmt: skip
-        if family == "live":
-            error = at(next(p for p in points if p.family == family))[1]
-            axes.axhline(error, color=color, linewidth=1, linestyle=(0, (4, 3)), zorder=2)
-        if not own:
-            continue
-        x, y = np.array([placed[p.name] for p in own]).T
-        axes.plot(x, y, color=color, marker=marker, markersize=6, linewidth=1.3, zorder=3,
-                  markeredgecolor=PAPER, markeredgewidth=0.6)  # fmt: skip
-        ends.append((float(x[-1]), float(y[-1]), family, color))
+        own = sorted((p for p in placed if p.family == family), key=lambda p: at[p.name])
+        line = np.array([at[p.name] for p in own])
+        spread = [errors[p.name].sd for p in own]
+        axes.errorbar(
+            line[:, 0], line[:, 1], spread, fmt="none", ecolor=color, elinewidth=1, alpha=0.35
+        )
+        axes.plot(*line.T, color=color, marker=marker, markersize=6.5, linewidth=1.4, zorder=3,
+                  markeredgecolor=PAPER, markeredgewidth=0.7)  # fmt: skip
+        own_lines[family] = line
+    for_clients = [p for p in placed if p.family not in EMULATED]
+    best = [for_clients[i] for i in pareto([at[p.name] for p in for_clients])]
+    front = np.array([at[p.name] for p in best]).reshape(-1, 2)
+    axes.plot(*front.T, color=LINE, linewidth=8, solid_capstyle="round", zorder=1)
+    others = []
+    if LIVE in errors:
+        axes.axhline(errors[LIVE].mean, color=INK, linewidth=1, linestyle=DASHED, zorder=2)
+        others.append(np.array([(x, errors[LIVE].mean) for x in axes.get_xlim()]))
+    budgets = [(p.budget, np.array([at[p.name]])) for p in best if p.budget is not None]
+    return _Lines(own_lines, budgets, others)
+
+
+def _words(axes: Axes, lines: _Lines) -> None:
+    """Each family's name beside its line, then the front's budgets where there is room."""
+    labels = Labels(axes, [*lines.families.values(), *lines.others])
+    for family, line in lines.families.items():
+        labels.write(family, line, 8.5, INK, PAPER)
+    for budget, point in lines.front:
+        labels.write_if_free(str(budget), point, 7.0, FAINT, PAPER)
+
+
+def _axis(axes: Axes, cost: Cost, values: list[float]) -> None:
+    """A logarithmic axis, with numbers at 1, 2 and 5 where it spans few powers of ten."""
+    positive = [value for value in values if value > 0]
     axes.set_xscale("log")
     axes.set_xlabel(cost.label)
-    axes.xaxis.set_major_locator(LogLocator(10, numticks=12))
+    if positive:
+        axes.set_xlim(min(positive) / 2.5, max(positive) * 2.5)
+    few = bool(positive) and max(positive) / min(positive) < 30
+    axes.xaxis.set_major_locator(LogLocator(10, (1.0, 2.0, 5.0) if few else (1.0,), numticks=12))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: _short(value)))
     axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.margins(x=0.16, y=0.08)
-    axes.set_ylim(bottom=0)
-    return ends
 
 
 def error_against_distance(points: Sequence[Point], title: str, metric: str = "flip") -> Figure:
     """Every row's error at each size, from near to far; a panel per family with its budgets."""
-    shown = [f for f in families(points) if f != "live"]
-    live = next((p for p in points if p.family == "live"), None)
+    shown = [f for f in families(points) if f != LIVE]
     columns = min(4, len(shown)) or 1
     rows = -(-len(shown) // columns) or 1
+    ticks = sorted({size for point in points for size in point.pixels})
     with rc_context(STYLE):
-        figure = Figure(figsize=(2.55 * columns, 2.5 * rows + 0.5), layout="constrained")
+        figure = Figure(figsize=(2.45 * columns, 2.4 * rows + 0.5), layout="constrained")
         panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+        drawn = []
         for axes, family in zip(panels.flat, shown, strict=False):
-            color, marker = look(family, families(points))
-            own = [p for p in points if p.family == family]
-            if live is not None:
-                axes.plot(live.pixels, _means(live, metric), color=INK, linewidth=1,
-                          linestyle=(0, (4, 3)))  # fmt: skip
-            for i, point in enumerate(own):
-                fade = 0.35 + 0.65 * (i + 1) / len(own)
-                axes.plot(point.pixels, _means(point, metric), color=color, marker=marker,
-                          markersize=4, linewidth=1.3, alpha=fade)  # fmt: skip
-                if point.budget is not None:
-                    axes.annotate(f"{point.budget}", (point.pixels[0], _means(point, metric)[0]),
-                                  (-4, 0), textcoords="offset points", ha="right", va="center",
-                                  fontsize=7, color=FAINT)  # fmt: skip
             axes.set_title(family)
             axes.set_xscale("log")
-            ticks = sorted({size for point in points for size in point.pixels})
             axes.set_xticks(ticks, [f"{t:g}" for t in ticks])
-            axes.xaxis.set_minor_formatter(NullFormatter())
             axes.minorticks_off()
             axes.yaxis.set_major_locator(MaxNLocator(5))
-            axes.set_ylim(bottom=0)
-            axes.margins(x=0.12)
-        panels[0, 0].invert_xaxis()
-        for axes in panels.flat[len(shown):]:  # fmt: skip
+            drawn.append(_distance_panel(axes, points, family, metric))
+        panels[0, 0].set_xlim(ticks[-1] * 1.6, ticks[0] / 1.25)  # near to far
+        panels[0, 0].set_ylim(bottom=0)
+        for axes in panels.flat[len(shown) :]:
             axes.set_visible(False)
-        figure.supxlabel("height on the screen, pixels (near to far)", fontsize=9, color=FAINT)
         figure.supylabel(_error_label(points, metric), fontsize=9, color=FAINT)
-        figure.suptitle(title, x=0.01, ha="left", fontsize=11)
+        _framed(figure, title, "height on the screen, pixels, from near to far; numbers: budgets; "
+                "dashed: the original, live; band: the least of all")  # fmt: skip
+        for axes, lines in zip(panels.flat, drawn, strict=False):
+            labels = Labels(axes, [line for _, line in lines])
+            for budget, line in lines:
+                if budget is not None:
+                    labels.write_if_free(str(budget), line[:1], 7.0, FAINT, PAPER, LEFT)
     return figure
+
+
+def _distance_panel(
+    axes: Axes, points: Sequence[Point], family: str, metric: str
+) -> list[tuple[int | None, Line]]:
+    """Draw a family's rows over the live original's; their budgets and lines, near points first."""
+    color, marker = look(family, families(points))
+    lines = []
+    axes.plot(*_least(points, metric).T, color=LINE, linewidth=7, solid_capstyle="round", zorder=1)
+    for point in points:
+        line = np.array([point.pixels, [e.mean for e in point.errors[metric]]]).T
+        if point.family == LIVE:
+            axes.plot(*line.T, color=INK, linewidth=1, linestyle=DASHED, zorder=2)
+        elif point.family == family:
+            axes.plot(*line.T, color=color, marker=marker, markersize=5.5, linewidth=1.3, zorder=3,
+                      markeredgecolor=PAPER, markeredgewidth=0.5)  # fmt: skip
+            lines.append((point.budget, line))
+    return lines
+
+
+def _least(points: Sequence[Point], metric: str) -> Line:
+    """The least error of all rows that a client can draw, at each size that they share."""
+    for_clients = [p for p in points if p.family not in EMULATED]
+    sizes = sorted(set.intersection(*(set(p.pixels) for p in for_clients)))
+    of = [[p.errors[metric][p.pixels.index(s)].mean for p in for_clients] for s in sizes]
+    return np.array([sizes, [min(errors) for errors in of]]).T
+
+
+def _framed(figure: Figure, title: str, key: str) -> None:
+    """Title above, key below; then settle where everything is, so that words can be placed."""
+    figure.suptitle(title, x=0.01, ha="left", fontsize=11)
+    figure.supxlabel(key, x=0.99, ha="right", fontsize=7.5, color=FAINT)
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # settled: saving need not do it again
 
 
 def look(family: str, among: Sequence[str]) -> tuple[str, str]:
@@ -199,7 +255,16 @@ def svg(figure: Figure, described: str) -> str:
     for color, name in IN_PAGE.items():
         text = text.replace(color, name)
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    text = _named_apart(text)
     return text.replace("<svg ", f'<svg role="img" aria-label="{described}" ', 1)
+
+
+def _named_apart(text: str) -> str:
+    """With ids of its own, so that a page may hold several figures."""
+    own = sha256(text.encode()).hexdigest()[:8]
+    text = re.sub(r'\bid="', f'id="{own}-', text)
+    text = text.replace('xlink:href="#', f'xlink:href="#{own}-')
+    return text.replace("url(#", f"url(#{own}-")
 
 
 def png(figure: Figure) -> bytes:
@@ -208,10 +273,6 @@ def png(figure: Figure) -> bytes:
     with rc_context(STYLE):
         figure.savefig(stream, format="png", dpi=110, facecolor=PAPER, metadata={"Software": None})
     return stream.getvalue()
-
-
-def _means(point: Point, metric: str) -> list[float]:
-    return [spread.mean for spread in point.errors[metric]]
 
 
 def _error_label(points: Sequence[Point], metric: str) -> str:
@@ -224,16 +285,3 @@ def _short(value: float) -> str:
         if value >= factor:
             return f"{value / factor:g} {unit}"
     return f"{value:g}"
-
-
-def _name(axes: Axes, ends: list[End]) -> None:
-    """Write each family beside the end of its line, none over another."""
-    placed: list[tuple[float, float]] = []
-    for x, y, text, color in sorted(ends, key=lambda end: end[1]):
-        px, py = axes.transData.transform((x, y))
-        while any(abs(px - qx) < 60 and abs(py - qy) < 11 for qx, qy in placed):
-            py += 3
-        placed.append((px, py))
-        _, height = axes.transData.inverted().transform((px, py))
-        axes.annotate(text, (x, height), (7, 0), textcoords="offset points", color=color,
-                      va="center", fontsize=8.5, fontweight="bold")  # fmt: skip

@@ -15,6 +15,8 @@ from vegtool.measure.scores import Scores, spread
 
 LIVE = "live"
 """Name of the original as a client draws it: the line to beat."""
+EMULATED = ("octahedral",)
+"""Families that no stock client draws: for orientation, and on no Pareto front."""
 TRUTH = "truth"
 """What pictures of the original as it is are called."""
 
@@ -52,7 +54,6 @@ class Row:
     projection_px: tuple[float | None, ...] = ()
     bound_px: tuple[float | None, ...] = ()
     texel_px: tuple[float | None, ...] = ()
-    note: str = ""
 
     @property
     def bake_seconds(self) -> float:

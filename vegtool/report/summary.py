@@ -121,13 +121,13 @@ def _over(rows: list[Row], metric: str, size: float) -> Spread:
     return Spread(float(np.median(means)), found.sd, found.low, found.high)
 
 
-def pareto(cost: npt.ArrayLike, error: npt.ArrayLike) -> list[int]:
-    """Indices of the points (n,) that none beats in both, cheapest first.
+def pareto(points: npt.ArrayLike) -> list[int]:
+    """Indices of the points (n, 2), costs and errors, that none beats in both, cheapest first.
 
     A point is beaten by one that is no dearer and no worse, and better in one of them; of equal
     points the first stays.
     """
-    costs, errors = np.asarray(cost, np.float64), np.asarray(error, np.float64)
+    costs, errors = np.asarray(points, np.float64).reshape(-1, 2).T
     front: list[int] = []
     for i in np.lexsort((np.arange(len(costs)), errors, costs)):
         if not front or errors[i] < errors[front[-1]]:
