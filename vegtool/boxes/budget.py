@@ -52,8 +52,9 @@ def fit_budget(
     """Labels (f,) and their billboards, never more than `budget` of them.
 
     cluster_fn: given a number of clusters, returns the label of each face, 0 to at most that
-    number less one. It may return fewer clusters, so the budget may be missed; else at least nine
-    tenths of it are used. Raises UsageError for a budget below one billboard.
+    number less one. It may return fewer clusters, so the budget may be missed; else nine tenths of
+    it are used, or what the best of MAX_CALLS clusterings takes. Raises UsageError for a budget
+    below one billboard.
     """
     options = options or BoxOptions()
     if budget < 1:

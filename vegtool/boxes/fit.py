@@ -4,10 +4,10 @@ Paper: Colditz, Coconu, Deussen, Hege: Real-time rendering of complex photoreali
 using hybrid level-of-detail approaches (2005), section 2.1: a first box is jittered in steps of
 one degree. Here the steps go from coarse to fine, which leaves the local minima that single
 one-degree steps stick in, all neighbours of all boxes are tried at once, and a grid of starts
-precedes them; where a cluster spreads alike along two axes, exact rectangles have the last word
-(flush.py). Only points that can touch a box take part: the extreme ones in many directions,
-after the cluster has been stretched to equal spread along its principal axes. The box that comes
-out is measured on all points.
+precedes them; where a cluster is flat or spreads alike along two axes, exact rectangles have the
+last word (flush.py). Only points that can touch a box take part: the extreme ones in many
+directions, after the cluster has been stretched to equal spread along its principal axes. The box
+that comes out is measured on all points.
 """
 
 from __future__ import annotations
@@ -27,6 +27,8 @@ BLOCK = 512
 """Points whose extremes are sought together: their products stay in the processor's cache."""
 TIED = 1e-6
 """Variances that differ by less, as a fraction of the largest, leave the principal axes open."""
+BLOCKS = 64
+"""Blocks taken at once: a cluster of a million triangles takes no more memory than a small one."""
 LEAST_SPREAD = 1e-6
 """Standard deviation, as a fraction of the largest, below which a cluster counts as flat there."""
 TURNS_PER_STEP = 12
@@ -67,7 +69,7 @@ def fit_boxes(
     for start in range(0, len(groups), BATCH):
         batch = by_size[start : start + BATCH]
         found[batch] = search([support[i] for i in batch], options.steps_deg)
-    for i in np.flatnonzero(alike(spread)):
+    for i in np.flatnonzero(undecided(spread)):
         found[i] = flush_box(support[i], found[i])
     found = found @ frames
     low, high = extents(local, groups, found)
@@ -109,10 +111,12 @@ def principal_axes(local: FloatArray, groups: Groups) -> tuple[FloatArray, Float
     return axes, np.sqrt(np.maximum(values[:, ::-1], 0.0))
 
 
-def alike(spread: FloatArray) -> npt.NDArray[np.bool_]:
-    """(g,) whether points spread alike along two or three axes: which these are, rounding tells."""
+def undecided(spread: FloatArray) -> npt.NDArray[np.bool_]:
+    """(g,) whether points spread alike along two axes, which rounding then chooses, or lie in a
+    plane, where the least rectangle is known."""
     variance = spread**2
-    return np.asarray((-np.diff(variance, axis=1) <= TIED * variance[:, :1]).any(axis=1))
+    gaps = np.append(-np.diff(variance, axis=1), variance[:, 2:], axis=1)
+    return np.asarray((gaps <= TIED * variance[:, :1]).any(axis=1))
 
 
 def support_points(
@@ -138,9 +142,13 @@ def extreme_rows(points: npt.NDArray[np.float32]) -> npt.NDArray[np.intp]:
     while True:
         blocks = -(-len(rows) // BLOCK)
         padded = np.resize(rows, (blocks, -(-len(rows) // blocks)))
-        along = DIRECTIONS @ np.swapaxes(points[:, padded], 0, 1)  # (blocks, directions, points)
-        ends = np.concatenate([along.argmax(axis=2), along.argmin(axis=2)], axis=1)
-        rows = np.unique(np.take_along_axis(padded, ends, axis=1))
+        found = []
+        for first in range(0, blocks, BLOCKS):
+            part = padded[first : first + BLOCKS]
+            along = DIRECTIONS @ np.swapaxes(points[:, part], 0, 1)  # (blocks, directions, points)
+            ends = np.concatenate([along.argmax(axis=2), along.argmin(axis=2)], axis=1)
+            found.append(np.take_along_axis(part, ends, axis=1).ravel())
+        rows = np.unique(np.concatenate(found))
         if blocks == 1:
             return rows
 
