@@ -111,7 +111,7 @@ def test_a_picture_is_no_different_from_itself() -> None:
 
 def test_green_and_blue_are_as_different_as_colours_can_be() -> None:
     """The paper scales its colour differences by theirs."""
-    green, blue = np.float32([[[0, 1, 0]]]), np.float32([[[0, 0, 1]]])
+    green, blue = np.eye(3, dtype=np.float32)[1:, None, None]
     assert flip(green, blue).item() == pytest.approx(1, abs=TOLERANCE)
 
 

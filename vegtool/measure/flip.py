@@ -9,8 +9,8 @@ for each picture, `difference` for each pair.
 The fifteen filters along lines are the larger part of the work. Tried, milliseconds of processor
 time for those of one picture of 400 x 400: scipy.ndimage.correlate1d 11.5, sums of shifted pictures
 8.3, real FFT 6.7, products with banded Toeplitz matrices in blocks of 48 rows 4.4, of 16 rows 2.7
-(float32, one core with AVX-512). Small blocks also stay below the 2^18 multiplications from which
-OpenBLAS spreads one product over threads, so that pairs can be scored side by side.
+(float32, one core with AVX-512). Up to 500 pixels, blocks of 14 stay below the 2^18 multiplications
+from which OpenBLAS spreads one product over threads, so that pairs can be scored side by side.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ BLOCK = 14
 STRIP = 64
 """Rows whose colours are worked out at a time, so that intermediate results stay in the cache."""
 
-# The paper's constants. Gaussians a sqrt(pi / b) exp(-pi^2 x^2 / b), x in degrees (table 1).
+# The paper's constants. Gaussians a sqrt(pi / b) exp(-pi^2 x^2 / b), x in degrees.
 B_ACHROMATIC, B_RED_GREEN = 0.0047, 0.0053
 BLUE_YELLOW = ((34.1, 0.04), (13.5, 0.025))  # a, b of the two that are added
 FEATURE_DEG = 0.082
