@@ -181,8 +181,10 @@ class Plant:
     @cached_property
     def bounds(self) -> FloatArray:
         """(2, 3) metres: least and greatest corner of the vertices that faces use."""
-        used = self.positions[np.unique(self.faces)]
-        return np.stack([used.min(axis=0), used.max(axis=0)])
+        used = np.zeros(len(self.positions), dtype=bool)
+        used[self.faces] = True
+        corners = self.positions[used]
+        return np.stack([corners.min(axis=0), corners.max(axis=0)])
 
     @property
     def center(self) -> FloatArray:
