@@ -117,6 +117,16 @@ def same_objective(
     return widened(error, OBJECTIVE, "the same objective", offset_over_size, iterations, note)
 
 
+def drawn(error: float, plant_over_picture: float = 1.0, note: str = "") -> Outcome:
+    """The outcome of a case that compares pictures, drawn from single-precision positions about
+    the plant's middle. plant_over_picture: its radius, in sizes of what the picture shows."""
+    tolerance = ROUNDINGS * float(np.finfo(np.float32).eps) * max(plant_over_picture, 1.0)
+    reason = f"{ROUNDINGS:.0f} roundings in single precision"
+    if plant_over_picture > 1:
+        reason += f" at {plant_over_picture:.1e} sizes from the middle"
+    return Outcome(error, tolerance, reason, note=note)
+
+
 def widened(
     error: float,
     tolerance: float,

@@ -1,1 +1,87 @@
-CASES = ()
+"""The whole pipeline: a plant elsewhere, of another size or turned has the same levels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache, partial
+
+import numpy as np
+
+from vegtool.arrays import FloatArray
+from vegtool.convert import ConvertOptions, convert
+from vegtool.lod import LodChain
+from vegtool.measure.options import MeasureOptions
+from vegtool.plant import Plant
+from vegtool.stability.case import Case, Outcome, holds, same_objective
+from vegtool.stability.clustering import DEGENERATE
+from vegtool.stability.plants import MOTIONS, Motion, soup, tree
+
+OPTIONS = ConvertOptions(billboards=48, levels=2)
+
+
+def levels_of(plant: Plant) -> LodChain:
+    """The chain with distances by rule."""
+    return convert(plant, OPTIONS, MeasureOptions(measure="off"))
+
+
+def objectives(chain: LodChain, scale: float) -> FloatArray:
+    """(levels, 5): triangles, both errors, area of the billboards, area covered; for scale 1."""
+    rows = []
+    for level in chain.levels[1:]:
+        assert level.billboards and level.atlas and level.geometric_error_m
+        alpha = level.atlas.color[..., 3] / 255
+        share = [alpha[y : y + h, x : x + w].mean() for x, y, w, h in level.atlas.front.tolist()]
+        area = 4 * level.billboards.half_size.prod(axis=1) / scale**2
+        greatest, usual = level.geometric_error_m
+        rows.append(
+            [level.triangles, greatest / scale, usual / scale, area.sum(), area @ np.array(share)]
+        )
+    return np.array(rows)
+
+
+@cache
+def own() -> FloatArray:
+    """The objectives of the tree where it stands."""
+    return objectives(levels_of(tree()), 1.0)
+
+
+def motion_changes_nothing(motion: Motion) -> Outcome:
+    """All levels have the same triangles, errors, areas and coverage.
+
+    Of a turned plant the coverage is not compared: distances, and with them texels, go by its
+    longest extent along an axis, so its pictures are sampled elsewhere. The topic of baking
+    compares that with the billboards turned along.
+    """
+    apart = np.abs(objectives(levels_of(motion.plant(tree())), motion.scale) / own() - 1)
+    turned = not np.array_equal(motion.turn, np.eye(3))
+    compared = apart[:, :4] if turned else apart
+    note = f"{len(apart)} levels"
+    if turned:
+        note += f"; sampled elsewhere, they cover {apart[:, 4].max():.1e} more or less"
+    size = 2 * tree().radius / OPTIONS.billboards ** (1 / 3)
+    return same_objective(float(compared.max()), motion.offset_over(size), note=note)
+
+
+def always_some(made: Callable[[], FloatArray]) -> Outcome:
+    """Levels of anything with an extent: fewer triangles in each, the same bytes twice."""
+    one, two = (levels_of(soup(made())) for _ in range(2))
+    wrong = len(one.levels) < 2
+    for a, b in zip(one.levels[1:], two.levels[1:], strict=True):
+        assert a.atlas and b.atlas
+        wrong += not np.array_equal(a.atlas.color, b.atlas.color)
+    triangles = ", ".join(f"{level.triangles:,}" for level in one.levels)
+    return holds(wrong, "levels, twice the same", note=f"{triangles} triangles")
+
+
+CASES = (
+    *(
+        Case(f"convert: a tree, {motion.name}", "convert", "equivariance",
+             partial(motion_changes_nothing, motion), gl=True)
+        for motion in MOTIONS
+    ),
+    *(
+        Case(f"convert: {name}", "convert", "property", partial(always_some, made), gl=True)
+        for name, (made, _) in DEGENERATE.items()
+        if name != "all points equal"  # refused: a plant without extent has no distances
+    ),
+)  # fmt: skip
