@@ -109,10 +109,11 @@ def render(buffers: PlantBuffers, shot: Shot, light: Light, supersample: int = 1
     matrix = placed(buffers, shot)
     samples_per_metre = supersample * _pixels_per_metre(shot)
     sun = tuple(light.direction / np.linalg.norm(light.direction))
+    mips = ("MIPMAPPED",) if buffers.mipmaps else ()
     for group in buffers.groups:
         plain = () if group.material.color_texture is not None else ("NO_COLOR_MAP",)
         mapped = () if group.normal_map is None else ("NORMAL_MAP",)
-        shader = program(ctx, "camera.vert", "camera.frag", *plain, *mapped)
+        shader = program(ctx, "camera.vert", "camera.frag", *mips, *plain, *mapped)
         shader["view_projection"] = matrix
         shader["sun_direction"] = sun
         shader["sun"] = light.sun

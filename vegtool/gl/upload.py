@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from vegtool.arrays import ByteArray, FloatArray
 from vegtool.gl.context import context, describe
+from vegtool.gl.mipmaps import mip_levels
 from vegtool.plant import Material, Plant, Texture
 
 Owned = TypeVar("Owned", moderngl.Buffer, moderngl.Texture, moderngl.VertexArray)
@@ -27,8 +28,6 @@ VERTEX_FLOATS = 12
 """Per vertex: position, u, normal, v, colour (4); three vec4, as attributes or as texels."""
 VERTICES_PER_ROW = 1024
 """Of the vertex data texture, or as many more as keep its height below the driver's limit."""
-ANISOTROPY = 4.0
-"""Of textures with mips, where the driver has it: what engines ask for foliage by default."""
 MINIFIED = 4.0
 """Texels per sample, along each axis, from which samples take one texel instead of four."""
 
@@ -55,8 +54,7 @@ class PlantBuffers:
     matrix has to be as well.
     face_order: (f,) the plant's faces in the order of the index buffer, material by material.
     groups: one per material that has faces.
-    mipmaps: give textures mips and 4x anisotropy, as a client does, and leave the colour under
-    alpha 0 as it is.
+    mipmaps: give textures mips, as a client does, and leave the colour under alpha 0 as it is.
     """
 
     def __init__(
@@ -66,7 +64,7 @@ class PlantBuffers:
         self.ctx = ctx or context()
         self.origin: FloatArray = plant.center
         self.face_order = np.argsort(plant.face_material, kind="stable").astype(np.int32)
-        self._mipmaps = mipmaps
+        self.mipmaps = mipmaps
         self._filter = (
             moderngl.LINEAR_MIPMAP_LINEAR if mipmaps else moderngl.LINEAR,
             moderngl.LINEAR,
@@ -137,7 +135,7 @@ class PlantBuffers:
     def minified(self, group: MaterialGroup, samples_per_metre: float) -> bool:
         """Whether texels lie so dense that filtering averages a sixteenth of them at most, and
         costs a third more for it; never with mips."""
-        if self._mipmaps or group.material.color_texture is None:
+        if self.mipmaps or group.material.color_texture is None:
             return False
         return bool(self.texels_per_metre[group.number] > MINIFIED * samples_per_metre)
 
@@ -203,7 +201,7 @@ class PlantBuffers:
         key = (id(image), srgb, cut_out)
         if key not in self._textures:
             pixels = np.full((1, 1, 4), 255, np.uint8) if image is None else image.pixels
-            if cut_out and not self._mipmaps:
+            if cut_out and not self.mipmaps:
                 pixels = bled_under_alpha(pixels)
             height, width = pixels.shape[:2]
             limit = describe(self.ctx).max_texture
@@ -216,9 +214,10 @@ class PlantBuffers:
                 np.ascontiguousarray(pixels),
                 internal_format=SRGB8_ALPHA8 if srgb else None,
             )
-            if self._mipmaps:
-                texture.build_mipmaps()
-                texture.anisotropy = min(ANISOTROPY, self.ctx.max_anisotropy)
+            if self.mipmaps:
+                texture.build_mipmaps()  # allocates them
+                for level, image in enumerate(mip_levels(pixels, srgb), start=1):
+                    texture.write(np.ascontiguousarray(image), level=level)
             texture.filter = self._filter
             self._textures[key] = self._own(texture)
         return self._textures[key]

@@ -3,10 +3,16 @@ uniform sampler2D color_map;
 uniform vec4 base_color;
 uniform float alpha_cutoff;  // 0 for opaque materials: nothing is below it
 
+#ifdef MIPMAPPED
+#include "filter.glsl"
+#else
+#define filtered texture
+#endif
+
 vec3 surface_color(vec2 uv, vec4 vertex_color) {
     vec4 color = base_color * vertex_color;
 #ifndef NO_COLOR_MAP
-    color *= texture(color_map, uv);
+    color *= filtered(color_map, uv);
 #endif
     if (color.a < alpha_cutoff) discard;
     return color.rgb;
@@ -27,7 +33,7 @@ vec3 mapped_normal(vec3 normal, vec3 position, vec2 uv) {
     vec3 along_v = (dp1 * duv2.x - dp2 * duv1.x) * sign(det);  // towards smaller v: glTF's +Y
     vec3 tangent = along_u - normal * dot(normal, along_u);
     vec3 bitangent = along_v - normal * dot(normal, along_v);
-    vec3 texel = texture(normal_map, uv).xyz * 2.0 - 1.0;
+    vec3 texel = filtered(normal_map, uv).xyz * 2.0 - 1.0;
     texel.xy *= normal_scale;
     return normalize(normalize(tangent) * texel.x + normalize(bitangent) * texel.y
                      + normal * texel.z);

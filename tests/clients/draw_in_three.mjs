@@ -1,0 +1,87 @@
+// three.js in headless Chromium: draws .glb files by given cameras, under a sun and a sky alone.
+// stdin: {light: {sun, above, below}, jobs: [{file, views: [{eye, target, up, fov, full: [w, h],
+//         crop: [x, y, w, h], near, far, sun: [x, y, z], out}, ...]}, ...]}
+//   light: strengths as factors of the albedo. sun: towards it. fov: degrees, of the full image,
+//   of which a crop is drawn; pixels, from the upper left.
+// stdout: one JSON object per line and job, {file, complaints}. The picture of a view is written to
+//   the file `out`: RGBA as half floats, lowest row first, linear and premultiplied.
+// Materials keep their textures, factors, cutoff and sides, and become Lambert's. Pictures are
+// multisampled (4x) in half-float linear light, as three's own effect composer draws them.
+import fs from 'node:fs';
+import {inBrowser} from './browser.mjs';
+import {readInput} from './packages.mjs';
+
+const {light, jobs} = await readInput();
+
+const script = `
+import * as THREE from 'three';
+import {GLTFLoader} from 'three/addons/loaders/GLTFLoader.js';
+
+const light = ${JSON.stringify(light)};
+const ANISOTROPY = 4, SAMPLES = 4;
+const renderer = new THREE.WebGLRenderer({alpha: true, antialias: false});
+renderer.setClearColor(0x000000, 0);
+// Lambert's law divides the albedo by pi
+const gray = (value) => new THREE.Color(value, value, value).multiplyScalar(Math.PI);
+const sun = new THREE.DirectionalLight(gray(light.sun), 1);
+const sky = new THREE.HemisphereLight(gray(light.above), gray(light.below), 1);
+let scene;
+
+function lambert(old) {
+  const {map, normalMap, normalScale, alphaTest, side, color, vertexColors} = old;
+  for (const texture of [map, normalMap]) if (texture) texture.anisotropy = ANISOTROPY;
+  return new THREE.MeshLambertMaterial(
+    {map, normalMap, normalScale, alphaTest, side, color, vertexColors});
+}
+
+window.open3 = async (url) => {
+  scene?.traverse((node) => {
+    if (!node.isMesh) return;
+    node.geometry.dispose();
+    for (const map of ['map', 'normalMap']) node.material[map]?.dispose();
+    node.material.dispose();
+  });
+  const {scene: model} = await new GLTFLoader().loadAsync(url);
+  model.traverse((node) => { if (node.isMesh) node.material = lambert(node.material); });
+  scene = new THREE.Scene();
+  scene.add(model, sun, sky);
+};
+
+window.shoot = (view) => {
+  const [x, y, width, height] = view.crop;
+  const camera = new THREE.PerspectiveCamera(
+    view.fov, view.full[0] / view.full[1], view.near, view.far);
+  camera.setViewOffset(...view.full, x, y, width, height);
+  camera.position.set(...view.eye);
+  camera.up.set(...view.up);
+  camera.lookAt(...view.target);
+  sun.position.set(...view.sun);
+  const target = new THREE.WebGLRenderTarget(
+    width, height, {type: THREE.HalfFloatType, samples: SAMPLES});
+  renderer.setRenderTarget(target);
+  renderer.clear();
+  renderer.render(scene, camera);
+  const pixels = new Uint16Array(4 * width * height);
+  renderer.readRenderTargetPixels(target, 0, 0, width, height, pixels);
+  target.dispose();
+  const bytes = new Uint8Array(pixels.buffer), parts = [];
+  for (let i = 0; i < bytes.length; i += 8192) {
+    parts.push(String.fromCharCode(...bytes.subarray(i, i + 8192)));
+  }
+  return btoa(parts.join(''));
+};
+window.ready = true;
+`;
+
+const files = jobs.map((job) => job.file);
+await inBrowser(script, files, async (tab, complaints) => {
+  for (const [index, {file, views}] of jobs.entries()) {
+    complaints.length = 0;
+    await tab.evaluate((url) => window.open3(url), `/file/${index}`);
+    for (const view of views) {
+      const pixels = await tab.evaluate((v) => window.shoot(v), view);
+      fs.writeFileSync(view.out, Buffer.from(pixels, 'base64'));
+    }
+    console.log(JSON.stringify({file, complaints}));
+  }
+});
