@@ -16,10 +16,12 @@ from vegtool.batch import find_jobs
 from vegtool.cli import run
 from vegtool.errors import UsageError
 from vegtool.formats.gltf import plant_glb
+from vegtool.formats.manifest import read_manifest
 from vegtool.growth import sample
 
 pytestmark = pytest.mark.gl
-SMALL = ["--billboards", "24", "--levels", "2"]
+SMALL = ["--billboards", "24", "--levels", "2", "--measure", "off"]
+MEASURED = [*SMALL[:-1], "quick"]
 
 
 @pytest.fixture(scope="module")
@@ -62,14 +64,73 @@ def test_json_names_the_files(
     assert [row["kind"] for row in outcome["levels"]] == ["mesh", "billboards", "billboards"]
 
 
+def test_the_result_states_distances_and_errors(
+    model: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert run(["convert", str(model), "-o", str(out), "--json", *MEASURED]) == 0
+    (outcome,) = json.loads(capsys.readouterr().out)
+    levels = read_manifest(out / "bush.lod.json")["levels"]
+    assert len(levels) == len(outcome["levels"]) > 1
+    for row, level in zip(outcome["levels"], levels, strict=True):
+        assert row["switch_distance_m"] == level["switch_distance_m"]
+    for row, level in zip(outcome["levels"][1:], levels[1:], strict=True):
+        assert row["flip"] == level["measured"]["flip"]["mean"]
+        assert row["live_flip"] == level["measured"]["live"]["flip"]["mean"]
+    assert run(["convert", str(model), "-o", str(out), "-f", *MEASURED]) == 0
+    assert str(outcome["levels"][1]["flip"]) in capsys.readouterr().out
+
+
+def test_a_limit_that_is_missed_is_exit_4_and_the_files_are_there(
+    model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from vegtool.measure import chain
+
+    monkeypatch.setattr(chain, "HELD_OUT_MARGIN", -1.0)
+    folder, out = tmp_path / "in", tmp_path / "out"
+    folder.mkdir()
+    for name in ("a", "b"):
+        (folder / f"{name}.glb").write_bytes(model.read_bytes())
+    limited = ["--max-error", "0.3", *MEASURED]
+    assert run(["convert", str(folder / "a.glb"), "-o", str(out), *limited]) == 4
+    assert "LOD1 from" in capsys.readouterr().err
+    assert (out / "a.lod.json").exists()
+    assert run(["convert", str(folder), "-o", str(out), "-f", *limited]) == 4
+    assert (out / "b.lod.json").exists()
+    (folder / "c.glb").write_text("this is no glTF")
+    assert run(["convert", str(folder), "-o", str(out), "-f", *limited]) == 3, "a part failed"
+    assert "b: LOD1 from" in capsys.readouterr().err, "what was missed is told all the same"
+
+
+def test_a_limit_that_no_level_keeps_to_is_exit_4_and_nothing_is_written(
+    model: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert run(["convert", str(model), "-o", str(out), *MEASURED, "--max-error", "0"]) == 4
+    assert "--max-error" in capsys.readouterr().err
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("measure", ["quick", "off"])
+def test_a_gl_that_cannot_multisample_is_exit_5(
+    measure: str, model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    monkeypatch.setattr("moderngl.Context.max_samples", 1)
+    arguments = ["convert", str(model), "-o", str(tmp_path / "o"), *SMALL[:-1], measure]
+    assert run(arguments) == 5
+    assert "multisampling" in capsys.readouterr().err
+    assert not (tmp_path / "o").exists()
+
+
 def test_same_input_same_bytes_whatever_the_number_of_jobs(model: Path, tmp_path: Path) -> None:
     folder = tmp_path / "in"
     folder.mkdir()
     for name in ("a", "b"):
         (folder / f"{name}.glb").write_bytes(model.read_bytes())
     one, two = tmp_path / "one", tmp_path / "two"
-    assert run(["convert", str(folder), "-o", str(one), "-j", "1", *SMALL]) == 0
-    assert run(["convert", str(folder), "-o", str(two), "-j", "2", *SMALL]) == 0
+    assert run(["convert", str(folder), "-o", str(one), "-j", "1", *MEASURED]) == 0
+    assert run(["convert", str(folder), "-o", str(two), "-j", "2", *MEASURED]) == 0
     assert contents(one) == contents(two)
 
 
@@ -131,6 +192,20 @@ def test_one_bad_file_does_not_stop_the_others(
         (["convert", "bush.glb", "-o", "out", "--method", "magic"], 2, "magic"),
         (["convert", "bush.glb", "-o", "out", "--unit", "parsec"], 2, "parsec"),
         (["convert", "bush.glb", "-o", "out", "--config", "none.toml"], 2, "none.toml"),
+        (["convert", "bush.glb", "-o", "out", "--max-error", "-0.1"], 2, "--max-error"),
+        (["convert", "bush.glb", "-o", "out", "--max-error", "nan"], 2, "--max-error"),
+        (["convert", "bush.glb", "-o", "out", "--max-pixels", "0"], 2, "--max-pixels"),
+        (["convert", "bush.glb", "-o", "out", "--views", "below"], 2, "below"),
+        (
+            ["convert", "bush.glb", "-o", "out", "--measure", "off", "--max-error", "0.1"],
+            2,
+            "--measure off",
+        ),
+        (
+            ["convert", "bush.glb", "-o", "out", "--fov", "170", "--image-height", "64"],
+            2,
+            "narrower",
+        ),
         (["sample", "triffid", "-o", "x.glb"], 2, "broadleaf"),
         (["sample", "bush", "--triangles", "-3", "-o", "x.glb"], 2, "-3"),
         (["sample", "bush", "-o", "bush.obj"], 2, ".glb"),

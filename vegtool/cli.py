@@ -128,13 +128,15 @@ def convert_command(
                 console.say(f"{outcome.job.name}: level {row['level']}: {spent}", at=1)
     console.result([_as_json(o) for o in outcomes], _summary(outcomes, dry_run))
     failed = [o for o in outcomes if o.error]
+    missed = [f"{o.job.name}: {sentence}" for o in outcomes for sentence in o.misses]
+    if missed and failed:
+        console.say(f"error: {'; '.join(missed)}", at=-1)
     if len(outcomes) == 1 and failed:
         raise typer.Exit(failed[0].exit_code)
     if failed:
         names = ", ".join(str(o.job.source) for o in failed)
         kind = BatchError if len(failed) < len(outcomes) else VegtoolError
         raise kind(f"{len(failed)} of {len(outcomes)} inputs failed: {names}")
-    missed = [f"{o.job.name}: {sentence}" for o in outcomes for sentence in o.misses]
     if missed:
         raise QualityError("; ".join(missed))
 
