@@ -19,6 +19,8 @@ from vegtool.stability.plants import MOTIONS, TRIANGLE, Motion, at, rotated, sou
 
 TEXELS = 150
 """Along the tree's height."""
+NONE = np.zeros(1, dtype=np.int32)
+"""The cluster of a lone billboard."""
 
 
 def covered_area(baked: Baked) -> float:
@@ -66,7 +68,7 @@ def half_a_picture(motion: Motion) -> Outcome:
     square = np.array([[-1.0, -1, 0], [0, -1, 0], [0, 1, 0], [-1, 1, 0]])
     plant = soup(np.stack([square[[0, 1, 2]], square[[0, 2, 3]]]))
     board = Billboards(
-        np.zeros((1, 3)), np.eye(3)[:1], np.eye(3)[1:2], np.ones((1, 2)), np.ones(1), np.zeros(1)
+        np.zeros((1, 3)), np.eye(3)[:1], np.eye(3)[1:2], np.ones((1, 2)), np.ones(1), NONE
     )
     labels = np.zeros(2, dtype=np.int32)
     baked = bake(motion.plant(plant), labels, moved(board, motion), 16 / motion.scale)
@@ -98,7 +100,7 @@ def a_million() -> Outcome:
         np.eye(3)[1:2],
         np.array([[500.0, 250.0]]),
         np.ones(1),
-        np.zeros(1),
+        NONE,
     )
     baked = bake(plant, np.zeros(len(plant.faces), dtype=np.int32), board, 0.5)
     return exact(relative(covered_area(baked), 500_000.0), note=f"{len(plant.faces):,} triangles")
@@ -114,7 +116,7 @@ def always_some(made: Callable[[], FloatArray]) -> Outcome:
     wrong = [
         not np.array_equal(one.atlas.color, two.atlas.color),
         not np.array_equal(one.atlas.depth, two.atlas.depth),
-        (one.atlas.front[:, 2:] < 1).any(),
+        bool((one.atlas.front[:, 2:] < 1).any()),
     ]
     note = f"atlas {one.atlas.color.shape[1]} x {one.atlas.color.shape[0]}"
     return holds(sum(wrong), "pictures with texels, twice the same", note=note)

@@ -65,7 +65,7 @@ def motion_changes_nothing(motion: Motion) -> Outcome:
 def always_some(made: Callable[[], FloatArray]) -> Outcome:
     """Levels of anything with an extent: fewer triangles in each, the same bytes twice."""
     one, two = (levels_of(soup(made())) for _ in range(2))
-    wrong = len(one.levels) < 2
+    wrong = int(len(one.levels) < 2)
     for a, b in zip(one.levels[1:], two.levels[1:], strict=True):
         assert a.atlas and b.atlas
         wrong += not np.array_equal(a.atlas.color, b.atlas.color)
