@@ -6,7 +6,7 @@ Without models: all in the folder of real plants (VEGTOOL_MODELS, or ../shared/m
 checkout), and three samples. Levels of 16, 64, 256 and 1,024 billboards of k-means clusters by
 position (`crossed`: mostly two or three planes each) and by orientation too (`single`: mostly one),
 12 views all around, at the distances at which the plant is 400 to 25 pixels large. Measured are
-20,000 points spread over the surface, each with every plane that draws it, and for every plane the
+5,000 points spread over the surface, each with every plane that draws it, and for every plane the
 16 corners of faces that lie farthest from it; a billboard's displacement is its largest. Per row,
 over billboards, views and distances (cases, less those of billboards that displace nothing):
 
@@ -51,7 +51,6 @@ from vegtool.measure.bounds import (
 )
 from vegtool.measure.views import around, views
 from vegtool.plant import Plant
-from vegtool.seeding import generator
 
 ROOT = Path(__file__).resolve().parent.parent
 PLOT = ROOT / "docs" / "methods" / "bounds.png"
@@ -73,7 +72,7 @@ KINDS = {
 }
 LADDER = (400, 200, 100, 50, 25)
 """Sizes of the longest extent on the screen, in pixels."""
-POINTS = 20_000
+POINTS = 5000
 FARTHEST = 16
 """Corners of faces per billboard, those that lie farthest from its plane."""
 VIEWS = 12
@@ -171,23 +170,29 @@ def summary(level: Level) -> dict[str, Any]:
 
 
 def plot(levels: list[Level]) -> None:
+    """Shares of cases up to a ratio of displacement to estimate, for the coarsest and finest."""
     import matplotlib
 
     matplotlib.use("Agg")
     from matplotlib import pyplot as plt
 
-    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4), constrained_layout=True)
-    rng = generator(0, "plot")
-    flat = {k: np.concatenate([level[k].ravel() for level in levels]) for k in levels[0]}
-    shown = rng.choice(np.flatnonzero(flat["measured"] > 1e-3), 20000, replace=False)
-    for axes, key, title in (
-        (left, "paper", "e_p, eq. 4"),
-        (right, "bound", "projection_bound"),
-    ):
-        axes.loglog(flat["measured"][shown], flat[key][shown], ",", color="#2a6f97")
-        axes.plot([1e-3, 1e2], [1e-3, 1e2], color="black", linewidth=0.8)
-        axes.set(xlim=(1e-3, 1e2), ylim=(1e-3, 1e2), xlabel="measured displacement, pixels")
-        axes.set(ylabel=f"{title}, pixels", title=f"{title}: below the line it is too small")
+    figure, panels = plt.subplots(1, 2, figsize=(9, 3.6), sharey=True, constrained_layout=True)
+    for axes, first in zip(panels, (0, len(BUDGETS) - 1), strict=True):
+        chosen = levels[first :: len(BUDGETS)]
+        for name, color, label in (("paper", "#c44536", "e_p"), ("bound", "#2a6f97", "bound")):
+            for row, style in ((0, "-"), (len(LADDER) - 1, "--")):
+                measured = np.concatenate([level["measured"][row].ravel() for level in chosen])
+                stated = np.concatenate([level[name][row].ravel() for level in chosen])
+                seen = (measured > NOTHING) & (stated > 0)
+                ratio = np.sort(measured[seen] / stated[seen])
+                share = 100 * (np.arange(len(ratio)) + 1) / len(ratio)
+                text = f"{label}, plant {LADDER[row]} pixels large"
+                axes.plot(ratio, share, style, color=color, label=text, linewidth=1.4)
+        axes.axvline(1, color="black", linewidth=0.6)
+        axes.set(xlim=(0.85, 1.2), xlabel="measured displacement / stated")
+        axes.set(title=f"{BUDGETS[first]:,} billboards")
+    panels[0].set(ylabel="cases up to that ratio, %")
+    panels[1].legend(frameon=False, fontsize=8, loc="center right")
     figure.savefig(PLOT, dpi=110)
 
 
@@ -207,13 +212,13 @@ def main() -> None:
                 labels, billboards = fit_budget(plant, clusters, budget, boxes)
                 levels.append(measured_level(plant, labels, billboards))
                 error = geometric_error(plant, labels, billboards)[0]
-                depth = float(billboards.half_depth.max())
-                nearest = error / depth if depth > 0 else 1.0
                 head = {
                     "version": __version__, "plant": name, "kind": kind, "budget": budget,
                     "billboards": len(billboards),
                 }  # fmt: skip
-                rows.append(head | summary(levels[-1]) | {"nearest": f"{nearest:.2f}"})
+                found = summary(levels[-1])
+                nearest = f"{error / billboards.half_depth.max():.2f}" if found["cases"] else ""
+                rows.append(head | found | {"nearest": nearest})
                 print("  ".join(f"{value!s:>8}" for value in rows[-1].values()), flush=True)
     if known.record:
         record("bounds", rows)
