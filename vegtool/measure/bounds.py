@@ -156,15 +156,16 @@ def distance_for_pixels(level: Level, center: FloatArray, display: Display, pixe
         size = np.array([level.geometric_error_m[0]])
         reach = np.linalg.norm(level.mesh.positions - center, axis=1).max(initial=0.0) + size
 
+    if not size.any():
+        return 0.0
+
     def most(distance_m: float) -> float:
-        return float(_times(size, magnification(reach, distance_m, display)).max(initial=0.0))
+        return float(_times(size, magnification(reach, distance_m, display)).max())
 
     # beyond twice its reach, a billboard's error falls as 1 / (distance - reach)
     far = float(np.maximum(2 * reach, reach + display.distance_m(1.0) * size / pixels).max())
     far *= 1 + 1e-12
     near = 0.0
-    if not size.any():
-        return 0.0
     for _ in range(_HALVINGS):
         middle = (near + far) / 2
         if not near < middle < far:
