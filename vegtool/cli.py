@@ -185,11 +185,12 @@ def report_command(
         raise UsageError(f"expected {lacking}; got none")
     from vegtool.batch import find_jobs
     from vegtool.report import report as make_report
-    from vegtool.report.text import as_summary, summary_text
 
     sources = {job.name: job.source for job in find_jobs(inputs)}
     with console.bar("report") as progress:
         found = make_report(sources, report, read, out, force, progress)
+    from vegtool.report.text import as_summary, summary_text  # draws, which may not be possible
+
     for plant in found.plants:
         for note in plant.notes:
             console.say(f"{plant.name}: {note}")

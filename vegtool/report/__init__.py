@@ -7,7 +7,6 @@ report is whole, so that an interrupted one goes on where it stopped.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -55,8 +54,10 @@ def report(
 
 
 def _check_plots() -> None:
-    if find_spec("matplotlib") is None:
+    try:
+        import matplotlib  # noqa: F401
+    except ImportError as error:
         raise CapabilityError(
             "a report's plots are made by matplotlib, which is not installed; "
             "install it with: pip install 'vegtool[report]'"
-        )
+        ) from error

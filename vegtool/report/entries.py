@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import partial
 
 from vegtool.baselines import BASELINES, baseline
-from vegtool.baselines.octahedral import FRAMES, Octahedral
 from vegtool.convert import (
     TRIANGLES_PER_BILLBOARD,
     ConvertOptions,
@@ -95,18 +94,7 @@ def _baseline(name: str, budget: int, buffers: PlantBuffers, progress: Progress)
     found = baseline(buffers.plant, name, TRIANGLES_PER_BILLBOARD * budget)
     if found.level is None:
         raise CapabilityError(found.missing)
-    if isinstance(found.level, Octahedral):
-        return _impostor(found.level)
     return Made(found.level, found.triangles, found.texels, lambda: found.seconds)
-
-
-def _impostor(level: Octahedral) -> Made:
-    """Only the frames that are shown are baked, but a client needs all of them."""
-
-    def seconds() -> dict[str, float]:
-        return {stage: s * FRAMES**2 / level.baked for stage, s in level.seconds.items()}
-
-    return Made(level, level.triangles, level.texels, seconds)
 
 
 def _made(level: Level) -> Made:
