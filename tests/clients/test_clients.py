@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import base64
 import json
-import os
-import shutil
 import struct
 import subprocess
 import sys
@@ -19,21 +17,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from programs import MARKS, MODELS, node
 
 from vegtool.formats import READERS
 from vegtool.growth import SAMPLES
-
-HERE = Path(__file__).parent
-PACKAGES = Path(os.environ.get("VEGTOOL_NODE_MODULES", HERE / "node_modules"))
-MODELS = Path(os.environ.get("VEGTOOL_MODELS", HERE.parents[2] / "shared" / "models"))
-BROWSERS = (
-    os.environ.get("VEGTOOL_CHROMIUM", ""),
-    "chromium",
-    "chromium-browser",
-    "google-chrome",
-    "/Applications/Google Chrome.app/Contents/MacOS/Google Chrome",
-)
-BROWSER = next(filter(None, map(shutil.which, filter(None, BROWSERS))), None)
 
 # A silhouette is a grid of cells, of which those count that are covered by a quarter at least: the
 # outline of a crown, not of each leaf. Four pixels to a cell make a plant about 250 pixels high,
@@ -49,22 +36,7 @@ LEAST_COVER = 0.25  # of the area of the original's silhouette, mean over the vi
 SAME_MODEL = 0.95  # intersection over union of the user's own file and level 0
 
 
-def missing() -> str | None:
-    """What is not here that the checks need."""
-    if shutil.which("node") is None:
-        return "needs Node.js"
-    if not (PACKAGES / "three").is_dir():
-        return "needs npm packages: tests/clients/run installs them"
-    if BROWSER is None:
-        return "needs Chromium"
-    return None
-
-
-pytestmark = [
-    pytest.mark.clients,
-    # where these checks are demanded, a missing part is a failure
-    pytest.mark.skipif(bool(missing()) and not os.environ.get("CI"), reason=missing() or ""),
-]
+pytestmark = MARKS
 
 
 def sources() -> dict[str, Path | None]:
@@ -118,20 +90,6 @@ def vegtool(*arguments: str | Path) -> str:
     )
     assert done.returncode == 0, done.stderr
     return done.stdout
-
-
-def node(script: str, job: Any) -> list[dict[str, Any]]:
-    """Run one of the programs beside this file; return the objects that it prints."""
-    done = subprocess.run(
-        ["node", HERE / script],
-        input=json.dumps(job),
-        capture_output=True,
-        text=True,
-        timeout=600,
-        env={**os.environ, "VEGTOOL_NODE_MODULES": str(PACKAGES), "VEGTOOL_CHROMIUM": str(BROWSER)},
-    )
-    assert done.returncode == 0, done.stderr
-    return [json.loads(line) for line in done.stdout.splitlines()]
 
 
 @pytest.fixture(scope="session")
