@@ -61,6 +61,6 @@ def test_table_has_a_row_for_each_case() -> None:
     row = CaseResult("a | b", "boxes", "exact", 2e-10, 1e-9, "because", 3, 0.1, True, "")
     failed = CaseResult("c", "boxes", "property", 1.0, 0.0, "holds", None, 0.0, False, "twice")
     page = markdown([row, failed])
-    assert "1 of 2 cases hold" in page
+    assert "1 of 2 hold" in page
     assert "| a / b | exact | 2.0e-10 | 1.0e-09 | because | 3 | 0.10 |  |" in page
     assert "**c: fails**" in page

@@ -14,17 +14,30 @@ answer that is known; *equivariance*, the objective (inertia, volume, error, cov
 plant moved, scaled or turned; *property*, the number of violations of what must hold. Errors are
 relative. Far from the origin a tolerance grows with machine epsilon times offset over size, for no
 more is known of a coordinate there.
+
+## Limits
+
+- Clusters, boxes and errors are those of the plant wherever it stands. 5,000 km from the origin,
+  where positions are known to 1e-9 metres, clusters of plants full of exact ties (lattices, perfect
+  rings) may differ by some per cent in their inertia.
+- The search for boxes stops within 2 % of the shortest side. Boxes of flat clusters, and of those
+  that spread alike along two axes, are turned further, onto exact rectangles.
+- Texels and distances go by the longest extent along an axis, so a turned plant is sampled more or
+  less finely, and its coverage differs by what sampling differs.
+- The GPU holds positions in single precision about the plant's middle: what is 1e4 times smaller
+  than the plant is drawn to about a thousandth of its own size.
+- A camera's near plane is at least a thousandth as far as its far plane; what is nearer is cut off.
 """
-COLUMNS = ("case", "oracle", "error", "at most", "because", "rounds", "seconds", "")
+COLUMNS = ("case", "oracle", "error", "at most", "because", "rounds", "seconds", "note")
 
 
 def markdown(results: Sequence[CaseResult]) -> str:
     """A page: how many cases hold, then a table for each topic."""
     passed = sum(result.passed for result in results)
     seconds = sum(result.seconds for result in results)
-    lines = [HEADING, f"{passed} of {len(results)} cases hold; {seconds:.0f} s in all."]
+    lines = [HEADING, "## Cases", "", f"{passed} of {len(results)} hold; {seconds:.0f} s in all."]
     for topic, group in groupby(results, key=lambda result: result.topic):
-        lines += ["", f"## {topic.capitalize()}", _row(COLUMNS), _row(["---"] * len(COLUMNS))]
+        lines += ["", f"## {topic.capitalize()}", "", _row(COLUMNS), _row(["---"] * len(COLUMNS))]
         for result in group:
             lines.append(_row(_cells(result)))
     return "\n".join(lines) + "\n"
