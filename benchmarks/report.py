@@ -129,7 +129,7 @@ def main() -> None:
 
     def progress(stage: str, fraction: float) -> None:
         nonlocal said
-        row = ":".join(stage.split(":")[:2])
+        row = ":".join(stage.split(":")[:2]).partition(",")[0]
         if row != said:
             said = row
             print(f"{monotonic() - start:7.1f} s  {fraction:4.0%}  {stage}", flush=True)

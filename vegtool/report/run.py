@@ -33,7 +33,7 @@ from vegtool.report.options import ReportOptions
 from vegtool.report.pictures import of_truth, sizes_of
 from vegtool.report.rows import LIVE, TRUTH, Pictures, PlantReport, Report, Row, as_json, from_json
 
-TRUTHS = 3.0
+TRUTHS = 8.0
 """Rows that the truths of a plant take as long as, about."""
 
 
