@@ -31,7 +31,8 @@ PIXELS = 128
 def directions(side: int = FRAMES) -> FloatArray:
     """(side * side, 3) unit vectors: the middles of the map's cells, row by row.
 
-    The map's middle is up (+y), its edges are the horizon's diamond, its corners are all down.
+    The map's middle is up (+y), the diamond between the middles of its edges is the horizon, and
+    all of its corners are down.
     """
     across = (2 * np.arange(side) + 1) / side - 1
     x, z = (a.ravel() for a in np.meshgrid(across, across))
