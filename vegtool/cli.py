@@ -194,6 +194,9 @@ def report_command(
     for plant in found.plants:
         for note in plant.notes:
             console.say(f"{plant.name}: {note}")
+        for row in plant.rows:
+            spent = ", ".join(f"{stage} {s:.2f} s" for stage, s in row.cost.seconds.items())
+            console.say(f"{plant.name}: {row.name}: {spent}", at=1)
     console.result(as_summary(found, out), summary_text(found, out))
     for name, error in found.failed.items():
         console.say(f"error: {name}: {error}", at=-1)

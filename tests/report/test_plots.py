@@ -86,7 +86,7 @@ def test_words_beside_one_point_do_not_cover_each_other() -> None:
     point = np.array([[1.0, 1.0]])
     labels = Labels(axes, [point])
     for word in ("branches", "isodata", "kmeans"):
-        labels.write(word, point, 8.0, "black", "white")
+        labels.write(word, point, 8.0, "black")
     figure.draw_without_rendering()
     boxes = [t.get_window_extent() for t in axes.texts]
     assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
@@ -97,5 +97,5 @@ def test_words_that_have_no_room_are_left_out() -> None:
     axes = figure.subplots()
     everywhere = np.array([[x, y] for x in np.linspace(0, 1, 20) for y in (0.0, 0.5, 1.0)])
     labels = Labels(axes, [everywhere])
-    labels.write_if_free("1024", np.array([[0.5, 0.5]]), 8.0, "black", "white")
+    labels.write_if_free("1024", np.array([[0.5, 0.5]]), 8.0, "black")
     assert not axes.texts

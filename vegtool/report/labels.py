@@ -11,7 +11,6 @@ from itertools import pairwise
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.patheffects import withStroke
 
 from vegtool.arrays import FloatArray
 
@@ -46,30 +45,18 @@ class Labels:
         self._inside = np.array([low, high])
         self._boxes: list[FloatArray] = []
 
-    def write(self, text: str, line: Line, size: float, color: str, paper: str) -> None:
-        """Write beside whichever point of a line has the most room; a halo keeps it readable."""
-        self._write(text, line, size, (color, paper), SIDES, float("inf"))
+    def write(self, text: str, line: Line, size: float, color: str) -> None:
+        """Write beside whichever point of a line has the most room."""
+        self._write(text, line, size, color, SIDES, float("inf"))
 
     def write_if_free(
-        self,
-        text: str,
-        line: Line,
-        size: float,
-        color: str,
-        paper: str,
-        sides: Sequence[Side] = SIDES,
+        self, text: str, line: Line, size: float, color: str, sides: Sequence[Side] = SIDES
     ) -> None:
         """The same, on some sides alone, and not over anything."""
-        self._write(text, line, size, (color, paper), sides, FREE)
+        self._write(text, line, size, color, sides, FREE)
 
     def _write(
-        self,
-        text: str,
-        line: Line,
-        size: float,
-        colors: tuple[str, str],
-        sides: Sequence[Side],
-        most: float,
+        self, text: str, line: Line, size: float, color: str, sides: Sequence[Side], most: float
     ) -> None:
         extent = np.array([LETTER * size * len(text), 1.1 * size])
         best = None
@@ -84,7 +71,7 @@ class Labels:
             return
         _, number, offset, box = best
         self._boxes.append(box)
-        written = self._axes.annotate(
+        self._axes.annotate(
             text,
             tuple(line[number]),
             tuple(offset),
@@ -92,10 +79,9 @@ class Labels:
             ha="center",
             va="center_baseline",
             fontsize=size,
-            color=colors[0],
+            color=color,
             zorder=5,
         )
-        written.set_path_effects([withStroke(linewidth=2.5, foreground=colors[1])])
 
     def _price(self, box: FloatArray) -> float:
         """How much of what is drawn lies under a box, and how much of it is outside the panel."""

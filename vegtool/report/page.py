@@ -16,6 +16,12 @@ from vegtool.report.summary import Point, families, medians, points
 
 SIGNED = ("coverage_bias", "color_bias")
 """Metrics whose best value is 0, from both sides."""
+SEEN = {
+    "all": "all around",
+    "ground": "near the ground, as a walker sees it",
+    "aerial": "above the horizon, as from the air",
+}
+"""Where views lie (measure/views.py)."""
 GREATER_IS_BETTER = ("ssim", "psnr")
 
 
@@ -58,12 +64,12 @@ def _head(report: Report) -> str:
     names = [p.name for p in report.plants]
     what = names[0] if len(names) == 1 else f"{len(names)} plants"
     rows = len({row.name for plant in report.plants for row in plant.rows})
-    views = report.options.get("view_count"), report.options.get("views")
+    count, where = report.options["view_count"], SEEN[report.options["views"]]
     return (
         f"<header><h1>{escape(what)}: error against run time</h1>"
         f"<p>What stands in for the plant at a distance, {rows} ways to make it, each drawn as a "
-        f"client draws it and compared with the truth from {views[0]} directions "
-        f"({escape(str(views[1]))}), each under a sun of its own.</p>"
+        f"client draws it and compared with the truth from {count} directions {where}, each "
+        "under a sun of its own.</p>"
         f'<p class="facts">vegtool {escape(report.version)}. Drawn by '
         f"{escape(report.renderer)}.</p></header>"
     )
@@ -141,7 +147,7 @@ def _closest(found: Sequence[Point]) -> str:
             ]
         )
     head = ["height", "closest to the truth", "its FLIP", "live original's", "triangles"]
-    return _words_table(head, lines)
+    return _words_table(head, lines, "words")
 
 
 def _tables(found: Sequence[Point]) -> str:
@@ -291,14 +297,14 @@ def _pixels(value: float | None) -> str:
     return "none" if value is None else f"{value:.3g}"
 
 
-def _words_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+def _words_table(head: Sequence[str], rows: Sequence[Sequence[str]], kind: str = "") -> str:
     heads = "".join(f"<th scope='col'>{escape(h)}</th>" for h in head)
     body = "".join(
         "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows
     )
     return (
-        f'<div class="scroll"><table><thead><tr>{heads}</tr></thead><tbody>{body}</tbody>'
-        "</table></div>"
+        f'<div class="scroll"><table class="{kind}"><thead><tr>{heads}</tr></thead>'
+        f"<tbody>{body}</tbody></table></div>"
     )
 
 

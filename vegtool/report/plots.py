@@ -19,6 +19,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from vegtool.measure.metrics import METRICS
@@ -45,6 +46,8 @@ LOOKS: dict[str, tuple[str, str]] = {
 """Colour and marker by family."""
 OTHERS = (("#8f6bb3", "h"), ("#7a7a00", "*"), ("#a0522d", "<"), ("#2e8b8b", ">"))
 """For families that are new here, in turn."""
+HALO = 2.5
+"""Points, around words."""
 FONTS = ["DejaVu Sans", "Verdana", "Arial"]
 STYLE: Any = {
     "svg.fonttype": "none",
@@ -152,9 +155,9 @@ def _words(axes: Axes, lines: _Lines) -> None:
     """Each family's name beside its line, then the front's budgets where there is room."""
     labels = Labels(axes, [*lines.families.values(), *lines.others])
     for family, line in lines.families.items():
-        labels.write(family, line, 8.5, INK, PAPER)
+        labels.write(family, line, 8.5, INK)
     for budget, point in lines.front:
-        labels.write_if_free(str(budget), point, 7.0, FAINT, PAPER)
+        labels.write_if_free(str(budget), point, 7.0, FAINT)
 
 
 def _axis(axes: Axes, cost: Cost, values: list[float]) -> None:
@@ -198,7 +201,7 @@ def error_against_distance(points: Sequence[Point], title: str, metric: str = "f
             labels = Labels(axes, [line for _, line in lines])
             for budget, line in lines:
                 if budget is not None:
-                    labels.write_if_free(str(budget), line[:1], 7.0, FAINT, PAPER, LEFT)
+                    labels.write_if_free(str(budget), line[:1], 7.0, FAINT, LEFT)
     return figure
 
 
@@ -268,7 +271,10 @@ def _named_apart(text: str) -> str:
 
 
 def png(figure: Figure) -> bytes:
-    """The figure as a PNG on white paper."""
+    """The figure as a PNG on white paper, words with a halo as page.css gives them."""
+    for axes in figure.axes:
+        for words in axes.texts:
+            words.set_path_effects([withStroke(linewidth=HALO, foreground=PAPER)])
     stream = BytesIO()
     with rc_context(STYLE):
         figure.savefig(stream, format="png", dpi=110, facecolor=PAPER, metadata={"Software": None})
