@@ -24,7 +24,10 @@ if TYPE_CHECKING:
 
 __all__ = ["CaseResult", "cases", "markdown", "run"]
 
-TOPICS = ("clustering", "iterations", "boxes", "branches", "baking", "convert", "cameras", "colour")
+TOPICS = (
+    "clustering", "iterations", "boxes", "branches", "baking", "convert", "cameras", "distances",
+    "colour",
+)  # fmt: skip
 """Modules of this room, in the order of the table."""
 
 

@@ -13,16 +13,14 @@ from vegtool.arrays import FloatArray
 from vegtool.convert import ConvertOptions, convert
 from vegtool.errors import UsageError
 from vegtool.gl.upload import PlantBuffers
-from vegtool.lod import Display, Level
-from vegtool.measure.bounds import displacement_bound, distance_for_pixels, projection_bound
+from vegtool.lod import Display
 from vegtool.measure.metrics import reference, score
 from vegtool.measure.options import MeasureOptions
 from vegtool.measure.pictures import TRUTH_SUPERSAMPLE, live, truth
 from vegtool.measure.views import Camera, around, direction
 from vegtool.plant import Material
 from vegtool.seeding import generator
-from vegtool.stability.baking import clouds, moved
-from vegtool.stability.case import Case, Outcome, drawn, exact, holds, relative, same_objective
+from vegtool.stability.case import Case, Outcome, drawn, exact, holds, relative
 from vegtool.stability.plants import FAR, Motion, box_faces, rotated, soup, tree
 
 SIDE = 64
@@ -219,30 +217,6 @@ def fields_of_view(fov: float) -> Outcome:
     return exact(error)
 
 
-def bounds_move(motion: Motion) -> Outcome:
-    """Most that billboards displace anything, from any direction and in one view, elsewhere."""
-    display, here = Display(), clouds()[1]
-    values = []
-    for billboards, seen in ((here, view_of_tree()), (moved(here, motion), moved_camera(motion))):
-        anywhere = displacement_bound(billboards, seen.target, seen.distance_m, display)
-        values.append(np.stack([anywhere, projection_bound(billboards, seen)]))
-    error = float(np.abs(values[1] / values[0] - 1).max())
-    return same_objective(error, motion.offset / float(here.half_size.min()))
-
-
-def known_distance(pixels: float, scale: float) -> Outcome:
-    """From where a mesh that is off by e at most may be used to p pixels: r + e f / p from its
-    middle, once that is twice its reach; r is the reach, f a metre's pixels at a metre."""
-    plant = soup(scale * plate(1.0))
-    off = 0.01 * scale
-    level = Level("mesh", mesh=plant, geometric_error_m=(off, off))
-    display = Display()
-    found = distance_for_pixels(level, np.zeros(3), display, pixels)
-    reach = 2**0.5 * scale + off
-    right = reach + off * display.pixels_per_metre(1.0) / pixels
-    return exact(relative(found, max(right, 2 * reach)) if right >= 2 * reach else 0.0)
-
-
 def whole_pipeline(fov: float, height: int) -> Outcome:
     """Levels for such a display, measured; or a sentence that says why there are none."""
     options = ConvertOptions(billboards=24, levels=1, fov=fov, image_height=height)
@@ -296,17 +270,6 @@ CASES = (
         Case(f"picture of a tree, {motion.name}", "cameras", "equivariance",
              partial(moved_picture, motion), gl=True)
         for motion in MOTIONS
-    ),
-    *(
-        Case(f"bounds of a tree's billboards, {motion.name}", "cameras", "equivariance",
-             partial(bounds_move, motion), gl=True)
-        for motion in MOTIONS
-    ),
-    *(
-        Case(f"distance for {pixels:g} pixels, {scale:g} times the size", "cameras", "exact",
-             partial(known_distance, pixels, scale))
-        for pixels in (1e-3, 1.0)
-        for scale in (1e-6, 1.0, 1e6)
     ),
     *(
         Case(f"convert, field of view {fov:g}, {height} pixels high", "cameras", "property",

@@ -9,6 +9,7 @@ import numpy as np
 
 from vegtool.arrays import FloatArray
 from vegtool.convert import ConvertOptions, convert
+from vegtool.errors import UsageError
 from vegtool.lod import LodChain
 from vegtool.measure.options import MeasureOptions
 from vegtool.plant import Plant
@@ -25,7 +26,8 @@ def levels_of(plant: Plant) -> LodChain:
 
 
 def objectives(chain: LodChain, scale: float) -> FloatArray:
-    """(levels, 5): triangles, both errors, area of the billboards, area covered; for scale 1."""
+    """(levels, 6): triangles, both errors, area of the billboards; area covered, texels. For scale
+    1."""
     rows = []
     for level in chain.levels[1:]:
         assert level.billboards and level.atlas and level.geometric_error_m
@@ -34,7 +36,10 @@ def objectives(chain: LodChain, scale: float) -> FloatArray:
         area = 4 * level.billboards.half_size.prod(axis=1) / scale**2
         greatest, usual = level.geometric_error_m
         rows.append(
-            [level.triangles, greatest / scale, usual / scale, area.sum(), area @ np.array(share)]
+            [
+                *(level.triangles, greatest / scale, usual / scale, area.sum()),
+                *(area @ np.array(share), level.atlas.texels),
+            ]
         )
     return np.array(rows)
 
@@ -62,6 +67,15 @@ def motion_changes_nothing(motion: Motion) -> Outcome:
     return same_objective(float(compared.max()), motion.offset_over(size), note=note)
 
 
+def without_extent() -> Outcome:
+    """A plant that is a point is seen from no distance: a sentence says so."""
+    try:
+        levels_of(soup(DEGENERATE["all points equal"][0]()))
+    except UsageError as error:
+        return holds("extent" not in str(error), "is refused in a sentence")
+    return holds(1, "is refused in a sentence")
+
+
 def always_some(made: Callable[[], FloatArray]) -> Outcome:
     """Levels of anything with an extent: fewer triangles in each, the same bytes twice."""
     one, two = (levels_of(soup(made())) for _ in range(2))
@@ -82,6 +96,7 @@ CASES = (
     *(
         Case(f"convert: {name}", "convert", "property", partial(always_some, made), gl=True)
         for name, (made, _) in DEGENERATE.items()
-        if name != "all points equal"  # refused: a plant without extent has no distances
+        if name != "all points equal"
     ),
+    Case("convert: all points equal", "convert", "property", without_extent, gl=True),
 )  # fmt: skip
