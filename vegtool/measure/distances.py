@@ -51,8 +51,9 @@ def switch_distances(
     one measured is taken.
 
     Between measured distances, errors and limits are taken to be linear in the logarithm of
-    distance. The last distance stands for all beyond. Distances are rounded up to three digits,
-    and increase by more than a fade from each level to the next.
+    distance; a level that would be used between two of them alone is left out. The last distance
+    stands for all beyond. Distances are rounded up to three digits, and increase by more than a
+    fade from each level to the next.
     """
     found: list[float | LeftOut] = []
     until, next_m = float(distance_m[-1]), np.inf
@@ -61,17 +62,15 @@ def switch_distances(
         if start is None:
             found.append(LeftOut.ERRS)
             continue
-        from_m, behind_m = (rounded_up(m) for m in start)
-        if not holds(level, from_m):
-            from_m = behind_m
-        if least_m is not None:
-            from_m = max(from_m, rounded_up(least_m[level]))
-        faded = (1 + FADE_FRACTION) * from_m
-        if faded > next_m:
+        least = 0.0 if least_m is None else rounded_up(least_m[level])
+        from_m, behind_m = (max(rounded_up(m), least) for m in start)
+        if (1 + FADE_FRACTION) * behind_m > next_m:
             found.append(LeftOut.SUPERSEDED)
             continue
+        if from_m < behind_m and not holds(level, from_m):
+            from_m = behind_m
         found.append(from_m)
-        until, next_m = min(faded, until), from_m
+        until, next_m = min((1 + FADE_FRACTION) * from_m, until), from_m
     return tuple(reversed(found))
 
 

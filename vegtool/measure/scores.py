@@ -14,6 +14,7 @@ from itertools import product
 from typing import TypeVar
 
 import numpy as np
+from scipy.spatial import ConvexHull, QhullError
 
 from vegtool.arrays import FloatArray
 from vegtool.errors import UsageError
@@ -30,6 +31,8 @@ LADDER = (400.0, 200.0, 100.0, 50.0, 25.0)
 """Sizes of the plant's longest extent on the screen, in pixels, at which errors are measured."""
 THREADS = min(4, os.cpu_count() or 1)
 """Pictures scored at a time."""
+MANY_POINTS = 10_000
+"""Below, looking at all of them is quicker than their hull."""
 Result = TypeVar("Result")
 
 
@@ -79,8 +82,9 @@ def truths(
     """
     display = display or Display()
     sizes, distances = outside(plant, pixels, display)
+    outline = _outline(plant.positions)
     cameras = tuple(
-        tuple(around(plant.positions, view.direction, distance, display) for view in views)
+        tuple(around(outline, view.direction, distance, display) for view in views)
         for distance in distances
     )
 
@@ -157,6 +161,16 @@ def scores(
             buffers.release()
     values = {name: np.array([f[name] for f in found]).reshape(shape) for name in METRICS}
     return Scores(truths.pixels, truths.distance_m, values)
+
+
+def _outline(points: FloatArray) -> FloatArray:
+    """(m, 3) the points of (n, 3) that any picture's bounds are made by: those of the hull."""
+    if len(points) < MANY_POINTS:
+        return points
+    try:
+        return np.asarray(points[ConvexHull(points - points.mean(axis=0)).vertices])
+    except QhullError:  # all in one plane
+        return points
 
 
 def spread(values: FloatArray) -> Spread:
