@@ -15,7 +15,7 @@ from vegtool.gl.upload import PlantBuffers
 from vegtool.growth import sample
 from vegtool.measure.contact_sheet import contact_sheet
 from vegtool.measure.options import MeasureOptions
-from vegtool.measure.pictures import live, over, truth
+from vegtool.measure.pictures import fragments, frame_seconds, live, over, truth
 from vegtool.measure.views import Camera, direction
 from vegtool.plant import Material, Plant, Texture
 
@@ -50,7 +50,26 @@ def test_a_square_covers_a_quarter_of_the_frame_in_its_own_colour() -> None:
 def test_single_sided_is_not_seen_from_behind_and_double_sided_is() -> None:
     for double_sided in (False, True):
         with PlantBuffers(square(Material("m", double_sided=double_sided))) as buffers:
-            assert truth(buffers, front(back=True), AMBIENT).any() == double_sided
+            for picture in (truth, live):
+                assert picture(buffers, front(back=True), AMBIENT).any() == double_sided
+
+
+def test_truth_and_live_have_the_same_light_on_both_sides() -> None:
+    """The sun at 60 degrees from the one normal, behind the other; the sky from the side."""
+    light = Light(direction=np.array([3**0.5, 0.0, 1.0]), sun=0.8, sky_above=0.3, sky_below=0.1)
+    with PlantBuffers(square(Material("m", double_sided=True)), mipmaps=True) as buffers:
+        for picture in (truth, live):
+            assert picture(buffers, front(), light)[32, 32, 0] == pytest.approx(0.6, abs=1e-3)
+            back = picture(buffers, front(back=True), light)
+            assert back[32, 32, 0] == pytest.approx(0.2, abs=1e-3)
+
+
+def test_a_square_is_so_many_fragments_and_its_frames_take_time() -> None:
+    with PlantBuffers(square(Material("m")), mipmaps=True) as buffers:
+        assert fragments(buffers, front()) == 32 * 32
+        assert fragments(buffers, front(back=True)) == 0
+        seconds = frame_seconds(buffers, front(), repeats=3)
+    assert seconds.shape == (3,) and (seconds > 0).all()
 
 
 def test_the_truth_keeps_the_coverage_that_alpha_tested_mips_lose() -> None:
