@@ -72,7 +72,13 @@ def _flag(item: Any, hint: Any, group: str) -> inspect.Parameter:
 
 
 def _panel(group: str) -> str:
-    return {"ConvertOptions": "Levels of detail", "ReadOptions": "Reading"}.get(group, group)
+    titles = {
+        "ConvertOptions": "Levels of detail",
+        "MeasureOptions": "Measuring",
+        "ReportOptions": "What is compared",
+        "ReadOptions": "Reading",
+    }
+    return titles.get(group, group)
 
 
 def read_config(context: typer.Context, path: Path | None) -> Path | None:
