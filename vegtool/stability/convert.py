@@ -67,6 +67,23 @@ def motion_changes_nothing(motion: Motion) -> Outcome:
     return same_objective(float(compared.max()), motion.offset_over(size), note=note)
 
 
+@cache
+def own_distances() -> tuple[float, ...]:
+    """From where the tree's levels may be used, measured where it stands."""
+    chain = convert(tree(), OPTIONS, MeasureOptions(measure="quick"))
+    return tuple(level.near_distance_m for level in chain.levels[1:])
+
+
+def distances_stay(motion: Motion) -> Outcome:
+    """Distances that were measured scale with the plant; they are stated to three digits."""
+    chain = convert(motion.plant(tree()), OPTIONS, MeasureOptions(measure="quick"))
+    there = [level.near_distance_m / motion.scale for level in chain.levels[1:]]
+    right = own_distances()
+    apart = [abs(a / b - 1) for a, b in zip(there, right, strict=True)]
+    note = ", ".join(f"{d:g} m" for d in right)
+    return Outcome(max(apart), 0.01, "the third digit, rounded up", note=note)
+
+
 def without_extent() -> Outcome:
     """A plant that is a point is seen from no distance: a sentence says so."""
     try:
@@ -97,6 +114,11 @@ CASES = (
         Case(f"convert: {name}", "convert", "property", partial(always_some, made), gl=True)
         for name, (made, _) in DEGENERATE.items()
         if name != "all points equal"
+    ),
+    *(
+        Case(f"convert: distances, {motion.name}", "convert", "equivariance",
+             partial(distances_stay, motion), gl=True)
+        for motion in MOTIONS[:3]  # turned, other views are measured
     ),
     Case("convert: all points equal", "convert", "property", without_extent, gl=True),
 )  # fmt: skip

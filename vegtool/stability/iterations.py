@@ -17,7 +17,7 @@ from vegtool.boxes.fit import TURNS_PER_STEP, box_sides, jitter
 from vegtool.boxes.options import Shape
 from vegtool.clustering import METHODS, ClusterOptions, cluster
 from vegtool.clustering.features import coarse, samples
-from vegtool.clustering.isodata import lines, merge_collinear, move, split_wide
+from vegtool.clustering.lines import lines, merge_collinear, move, split_wide
 from vegtool.clustering.partition import error, lloyd, split
 from vegtool.seeding import generator
 from vegtool.stability.case import Case, Outcome, exact, holds, widened
