@@ -64,18 +64,19 @@ def test_a_picture_in_tiles_is_the_picture(tree, how, monkeypatch):
     """Where a target holds few samples, and where a driver's textures are narrow."""
     camera = camera_of(tree)
     whole = picture_of(tree, camera, **how)
-    monkeypatch.setattr(targets, "SAMPLE_LIMIT", 2500)
+    monkeypatch.setattr(targets, "SIDE", 20)
     tiled = picture_of(tree, camera, **how)
     # a tile's matrix is another one: a sample on an edge may fall to the other side
     assert np.mean(np.abs(tiled - whole).max(axis=2) > 1e-3) < 0.02
 
 
-def test_targets_are_kept_and_grow():
+def test_targets_are_kept_and_grow(monkeypatch):
+    monkeypatch.setattr(targets, "_kept", {})
     ctx = context()
     first = drawing_target(ctx, (100, 100), 0)
     assert drawing_target(ctx, (90, 40), 0) is first
-    grown = drawing_target(ctx, (100, first.color.height + 1), 0)
-    assert grown.color.width >= first.color.width
+    grown = drawing_target(ctx, (100, 300), 0)
+    assert grown.color.size == (first.color.width, 384)
     assert type(first.color.mglo).__name__ == "InvalidObject", "the smaller one is freed"
 
 

@@ -12,10 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from vegtool.arrays import FloatArray
-from vegtool.gl import targets
-from vegtool.gl.context import check, describe, framebuffer_kept
+from vegtool.gl.context import check, framebuffer_kept
 from vegtool.gl.program import program
-from vegtool.gl.targets import Target, drawing_target, pixel_target
+from vegtool.gl.targets import Target, drawing_target, pixel_target, side
 from vegtool.gl.upload import MaterialGroup, PlantBuffers
 
 Picture = npt.NDArray[np.float32]
@@ -71,10 +70,9 @@ def draw(
 def tiles(ctx: moderngl.Context, shot: Shot, supersample: int) -> Iterator[tuple[int, int, Shot]]:
     """Parts of a picture that a target can hold, and where they lie, in pixels right and down;
     most pictures are one."""
-    columns = min(shot.width, describe(ctx).max_texture // supersample)
-    rows = max(min(shot.height, targets.SAMPLE_LIMIT // (columns * supersample**2)), 1)
-    for x, y in product(range(0, shot.width, columns), range(0, shot.height, rows)):
-        width, height = min(columns, shot.width - x), min(rows, shot.height - y)
+    most = max(side(ctx) // supersample, 1)
+    for x, y in product(range(0, shot.width, most), range(0, shot.height, most)):
+        width, height = min(most, shot.width - x), min(most, shot.height - y)
         crop = np.eye(4)
         crop[0, 0], crop[0, 3] = shot.width / width, (shot.width - 2 * x - width) / width
         crop[1, 1], crop[1, 3] = shot.height / height, (2 * y + height - shot.height) / height

@@ -1,7 +1,7 @@
 """What the camera draws into, kept from picture to picture.
 
 Making a target costs more than drawing a small plant into it, so every context keeps one of each
-kind, which grows when a larger picture is asked for and never holds more than SAMPLE_LIMIT.
+kind. It grows with the largest picture asked for, up to SIDE; larger pictures are drawn in tiles.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ import moderngl
 from vegtool.errors import CapabilityError
 from vegtool.gl.context import describe
 
-SAMPLE_LIMIT = 4_000_000
-"""Samples of a target, 12 bytes each; larger pictures are drawn tile by tile."""
+SIDE = 2048
+"""Samples along a side of the largest target: 50 MB without multisampling."""
 STEP = 128
 """Samples: sides are multiples of it, so that pictures of about a size share a target."""
 
@@ -37,6 +37,11 @@ class Target:
 
 
 _kept: WeakKeyDictionary[moderngl.Context, dict[int | None, Target]] = WeakKeyDictionary()
+
+
+def side(ctx: moderngl.Context) -> int:
+    """Samples along a side that a target can have."""
+    return min(SIDE, describe(ctx).max_texture)
 
 
 def drawing_target(ctx: moderngl.Context, size: tuple[int, int], samples: int) -> Target:
@@ -62,19 +67,14 @@ def _target(ctx: moderngl.Context, size: tuple[int, int], samples: int | None) -
     kept = _kept.setdefault(ctx, {})
     target = kept.get(samples)
     if target is not None:
-        width, height = target.color.size
-        if width >= size[0] and height >= size[1]:
+        held = target.color.size
+        if held[0] >= size[0] and held[1] >= size[1]:
             return target
-        both = max(width, size[0]), max(height, size[1])
-        size = both if both[0] * both[1] <= SAMPLE_LIMIT else size
+        size = max(held[0], size[0]), max(held[1], size[1])
         kept.pop(samples).release()
-    kept[samples] = _made(ctx, _rounded(size, describe(ctx).max_texture), samples)
+    width, height = (min(-(-n // STEP) * STEP, side(ctx)) for n in size)
+    kept[samples] = _made(ctx, (width, height), samples)
     return kept[samples]
-
-
-def _rounded(size: tuple[int, int], limit: int) -> tuple[int, int]:
-    width, height = (min(-(-n // STEP) * STEP, limit) for n in size)
-    return width, height
 
 
 def _made(ctx: moderngl.Context, size: tuple[int, int], samples: int | None) -> Target:

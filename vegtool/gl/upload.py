@@ -216,8 +216,8 @@ class PlantBuffers:
             )
             if self.mipmaps:
                 texture.build_mipmaps()  # allocates them
-                for level, image in enumerate(mip_levels(pixels, srgb), start=1):
-                    texture.write(np.ascontiguousarray(image), level=level)
+                for level, smaller in enumerate(mip_levels(pixels, srgb), start=1):
+                    texture.write(np.ascontiguousarray(smaller), level=level)
             texture.filter = self._filter
             self._textures[key] = self._own(texture)
         return self._textures[key]
