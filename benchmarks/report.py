@@ -29,7 +29,7 @@ from vegtool.growth import sample
 from vegtool.report import report
 from vegtool.report.options import ReportOptions
 from vegtool.report.plots import COSTS, error_against, png
-from vegtool.report.rows import LIVE, Report
+from vegtool.report.rows import Report
 from vegtool.report.summary import Point, medians, points
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -59,7 +59,7 @@ def rows(made: Report) -> list[dict[str, Any]]:
     """A row per plant and row of the report."""
     found = []
     for plant in made.plants:
-        for point in points(plant, LIVE):
+        for point in points(plant):
             flips = {
                 f"flip_{size:g}": f"{error.mean:.4f}"
                 for size, error in zip(point.pixels, point.errors["flip"], strict=True)
@@ -76,7 +76,7 @@ def rows(made: Report) -> list[dict[str, Any]]:
 
 def document(made: Report) -> str:
     """docs/error_against_time.md."""
-    of_all = medians(made.plants, LIVE)
+    of_all = medians(made.plants)
     blocks = [
         "# Error against time",
         "What stands in for a plant at a distance: how far it is from the truth (FLIP, mean ± "
@@ -94,7 +94,7 @@ def document(made: Report) -> str:
         blocks += [
             f"## {plant.name}",
             f"{plant.triangles:,} triangles.",
-            _table(points(plant, LIVE)),
+            _table(points(plant)),
         ]
         blocks += [
             f"Not in the table: {note}" for note in plant.notes if note.startswith("gltfpack")
@@ -143,7 +143,7 @@ def main() -> None:
         record("report", rows(made))
         PAGE.write_text(document(made), encoding="utf-8")
         title = f"Error against the time to make it: medians of {len(made.plants)} plants"
-        figure = error_against(medians(made.plants, LIVE), COSTS[0], title)
+        figure = error_against(medians(made.plants), COSTS[0], title)
         PAGE.with_suffix(".png").write_bytes(png(figure))
 
 

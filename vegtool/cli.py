@@ -11,6 +11,7 @@ import signal
 import sys
 from dataclasses import asdict
 from io import TextIOWrapper
+from math import isfinite
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -223,7 +224,10 @@ def _report_stability(console: Console, out: Path | None, force: bool, plants: b
     if out is not None:
         with FileSet(out, force) as files:
             files.add("stability.md", text.encode())
-    console.result([asdict(result) for result in results], text)
+    values = [asdict(result) for result in results]
+    for value in values:
+        value["error"] = value["error"] if isfinite(value["error"]) else None
+    console.result(values, text)
     failed = [result.name for result in results if not result.passed]
     if failed:
         raise QualityError(f"{len(failed)} of {len(results)} cases failed: {', '.join(failed)}")

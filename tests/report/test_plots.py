@@ -23,7 +23,7 @@ from vegtool.report.plots import (
 from vegtool.report.rows import LIVE
 from vegtool.report.summary import points
 
-POINTS = points(plant_report(), LIVE)
+POINTS = points(plant_report())
 
 
 @pytest.mark.parametrize("cost", COSTS, ids=lambda cost: cost.name)

@@ -17,6 +17,7 @@ from vegtool.growth import sample
 from vegtool.report import bench, plots
 from vegtool.report import run as running
 from vegtool.report.journal import NAME as JOURNAL
+from vegtool.stability.case import CaseResult
 
 pytestmark = pytest.mark.gl
 SMALL = ["--methods", "kmeans", "--budgets", "4,12", "--view-count", "1"]
@@ -230,6 +231,28 @@ def test_a_gl_that_cannot_multisample(
     monkeypatch.setattr(bench, "truths", None)
     assert run(["report", str(model), "-o", str(tmp_path / "out"), *SMALL]) == 5
     assert "multisampling" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("passed", "code"), [(True, 0), (False, 4)])
+def test_stability_is_told_and_written(
+    passed: bool,
+    code: int,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The cases themselves are those of tests/stability."""
+    error = 0.0 if passed else float("inf")
+    case = CaseResult("needles", "boxes", "exact", error, 1e-9, "by hand", None, 0.1, passed, "")
+    monkeypatch.setattr("vegtool.stability.run", lambda progress: [case])
+    assert run(["report", "--stability", "-o", str(tmp_path)]) == code
+    printed = capsys.readouterr()
+    assert "needles" in printed.out
+    assert (tmp_path / "stability.md").read_text().strip() == printed.out.strip()
+    assert ("1 of 1 cases failed: needles" in printed.err) == (not passed)
+    assert run(["report", "--stability", "--json"]) == code
+    assert json.loads(capsys.readouterr().out)[0]["passed"] == passed
+    assert run(["report", "--stability", "-o", str(tmp_path)]) == 1, "it stands there already"
 
 
 def test_without_matplotlib_it_ends_at_once(model: Path, tmp_path: Path) -> None:

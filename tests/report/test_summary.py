@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from report_cases import plant_report
 
-from vegtool.report.rows import LIVE, as_json, from_json
+from vegtool.report.rows import as_json, from_json
 from vegtool.report.summary import medians, pareto, points
 
 GRID = st.integers(0, 5)
@@ -29,7 +29,7 @@ def test_the_front_is_what_none_beats(found: list[tuple[int, int]]) -> None:
 
 
 def test_one_plant_keeps_its_spread_over_views() -> None:
-    live, finest, *_ = points(plant_report(), LIVE)
+    live, finest, *_ = points(plant_report())
     assert live.frame_ratio == 1.0
     assert finest.frame_ratio == pytest.approx(4 / 20)
     assert finest.bake_seconds == pytest.approx(0.5)
@@ -40,7 +40,7 @@ def test_one_plant_keeps_its_spread_over_views() -> None:
 
 def test_of_three_plants_the_middle_one_counts() -> None:
     three = [plant_report("oak", 0.0), plant_report("pine", 0.3), plant_report("birch", 0.01)]
-    finest = medians(three, LIVE)[1]
+    finest = medians(three)[1]
     error = finest.errors["flip"][1]
     assert finest.plants == 3
     assert (error.mean, error.low, error.high) == pytest.approx((0.09, 0.08, 0.38))

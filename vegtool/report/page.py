@@ -83,7 +83,7 @@ def _failed(report: Report) -> str:
 
 
 def _all_plants(report: Report) -> str:
-    found = medians(report.plants, LIVE)
+    found = medians(report.plants)
     names = ", ".join(p.name for p in report.plants)
     return (
         f"<p>Medians over {len(report.plants)} plants: {escape(names)}.</p>"
@@ -94,7 +94,7 @@ def _all_plants(report: Report) -> str:
 
 
 def _plant(plant: PlantReport) -> str:
-    found = points(plant, LIVE)
+    found = points(plant)
     notes = "".join(f"<li>{escape(note)}</li>" for note in plant.notes)
     return (
         f'<p class="facts">{plant.triangles:,} triangles, {plant.extent_m:.3g} metres. '
@@ -172,8 +172,9 @@ def _main_table(found: Sequence[Point]) -> str:
         Column("frame, ms", _frame, lambda p: p.frame_ms),
         _number("frame over live", "frame_ratio", ".2f"),
         _number("peak MB", "peak_mb"),
-        Column("use from, m", _from, lambda p: p.switch_distance_m),
     ]
+    if found[0].plants == 1:
+        costs.append(Column("use from, m", _from, lambda p: p.switch_distance_m))
     caption = (
         f"{METRICS['flip']} at each height on the screen: mean ± standard deviation over "
         + ("plants (median in place of the mean)" if found[0].plants > 1 else "views")

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from vegtool.lod import Spread
 from vegtool.measure.scores import spread
-from vegtool.report.rows import PlantReport, Row
+from vegtool.report.rows import LIVE, PlantReport, Row
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Point:
 
     plants: how many of them. errors: by metric, one per size (`pixels`): of one plant the mean and
     its spread over views, of several the median of the means in place of the mean, and their spread
-    over plants.
+    over plants. switch_distance_m: of one plant, as in Row.
     """
 
     name: str
@@ -59,38 +59,37 @@ COSTS: dict[str, Callable[[Row], float | None]] = {
     "bake_seconds": lambda row: row.bake_seconds,
     "frame_ms": lambda row: row.cost.frame.median_ms,
     "peak_mb": lambda row: row.cost.peak_mb,
-    "switch_distance_m": lambda row: row.switch_distance_m,
 }
 """Numbers of a row whose medians are taken; of several, over those that have one."""
 
 
-def points(plant: PlantReport, live: str) -> list[Point]:
-    """The rows of one plant. live: name of the row that frame times are compared with."""
-    return [_point([row], [_live_ms(plant, live)]) for row in plant.rows]
+def points(plant: PlantReport) -> list[Point]:
+    """The rows of one plant."""
+    return medians([plant])
 
 
-def medians(plants: Sequence[PlantReport], live: str) -> list[Point]:
+def medians(plants: Sequence[PlantReport]) -> list[Point]:
     """For each row that any plant has, medians over the plants that have it, in order.
 
-    Only the sizes that all of them were measured at.
+    Only of the sizes that all were measured at.
     """
     found: dict[str, list[tuple[Row, float]]] = {}
     for plant in plants:
+        live = next(row for row in plant.rows if row.name == LIVE)
         for row in plant.rows:
-            found.setdefault(row.name, []).append((row, _live_ms(plant, live)))
-    return [_point(*map(list, zip(*rows, strict=True))) for rows in found.values()]
+            ratio = row.cost.frame.median_ms / live.cost.frame.median_ms
+            found.setdefault(row.name, []).append((row, ratio))
+    sizes = [set(row.pixels) for rows in found.values() for row, _ in rows]
+    shared = sorted(set.intersection(*sizes), reverse=True) if sizes else []
+    return [
+        _point([row for row, _ in rows], [ratio for _, ratio in rows], tuple(shared))
+        for rows in found.values()
+    ]
 
 
-def _live_ms(plant: PlantReport, live: str) -> float:
-    return next((row.cost.frame.median_ms for row in plant.rows if row.name == live), float("nan"))
-
-
-def _point(rows: list[Row], live_ms: list[float]) -> Point:
+def _point(rows: list[Row], ratios: list[float], pixels: tuple[float, ...]) -> Point:
     first = rows[0]
-    shared = set.intersection(*(set(row.pixels) for row in rows))
-    pixels = tuple(sorted(shared, reverse=True))
     middle: dict[str, Any] = {name: _median(map(of, rows)) for name, of in COSTS.items()}
-    ratios = [row.cost.frame.median_ms / ms for row, ms in zip(rows, live_ms, strict=True)]
     low, high = np.median([row.cost.frame.quartiles_ms for row in rows], axis=0)
     return Point(
         first.name,
@@ -99,6 +98,7 @@ def _point(rows: list[Row], live_ms: list[float]) -> Point:
         len(rows),
         frame_quartiles_ms=(float(low), float(high)),
         frame_ratio=float(np.median(ratios)),
+        switch_distance_m=first.switch_distance_m if len(rows) == 1 else None,
         why_not=first.why_not,
         pixels=pixels,
         errors={

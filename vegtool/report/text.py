@@ -5,18 +5,18 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from vegtool.report.rows import LIVE, Report
+from vegtool.report.rows import Report
 from vegtool.report.summary import Point, medians, points
 from vegtool.report.write import FILES
 
 
 def as_summary(report: Report, folder: Path) -> dict[str, Any]:
     """What `--json` prints: the files, and for each plant, and over all, a line per row."""
-    found = {plant.name: points(plant, LIVE) for plant in report.plants}
+    found = {plant.name: points(plant) for plant in report.plants}
     return {
         "files": [str(folder / name) for name in FILES] if report.plants else [],
         "plants": {name: [_brief(point) for point in each] for name, each in found.items()},
-        "medians": [_brief(point) for point in medians(report.plants, LIVE)],
+        "medians": [_brief(point) for point in medians(report.plants)],
         "failed": dict(report.failed),
     }
 
@@ -47,7 +47,7 @@ def summary_text(report: Report, folder: Path) -> str:
         if len(report.plants) == 1
         else f"{len(report.plants)} plants, medians"
     )
-    found = medians(report.plants, LIVE)
+    found = medians(report.plants)
     sizes = found[0].pixels
     head = ("row", "triangles", *(f"{size:g} px" for size in sizes), "seconds", "frame ms")
     rows = [

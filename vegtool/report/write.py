@@ -13,7 +13,7 @@ from typing import Any
 from vegtool.errors import OutputError
 from vegtool.formats.atomic import FileSet, check_free
 from vegtool.report.page import page
-from vegtool.report.rows import LIVE, Report, Row, as_json
+from vegtool.report.rows import Report, Row, as_json
 from vegtool.report.summary import medians
 
 FILES = ("report.json", "report.csv", "report.html")
@@ -62,7 +62,7 @@ def encoded(report: Report) -> dict[str, Any]:
         "renderer": report.renderer,
         "options": dict(report.options),
         "plants": plants,
-        "medians": [asdict(p) for p in medians(report.plants, LIVE)] if several else [],
+        "medians": [asdict(p) for p in medians(report.plants)] if several else [],
         "failed": dict(report.failed),
     }
 

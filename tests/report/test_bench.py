@@ -1,0 +1,154 @@
+"""What is measured of a row, on a small plant."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from vegtool.formats.gltf import level_glb
+from vegtool.gl.upload import PlantBuffers
+from vegtool.growth import sample
+from vegtool.lod import Level
+from vegtool.measure.scores import scores
+from vegtool.plant import Plant
+from vegtool.progress import silent
+from vegtool.report.bench import Bench, measured, set_up
+from vegtool.report.entries import Entry, entries
+from vegtool.report.options import ReportOptions
+from vegtool.report.pictures import SIZES, of_truth, sizes_of
+from vegtool.report.rows import Row
+from vegtool.report.run import _Clock, _digest, _with_distances
+
+pytestmark = pytest.mark.gl
+OPTIONS = ReportOptions(methods="kmeans", budgets="4,30", view_count=2)
+
+
+@pytest.fixture(scope="module")
+def plant() -> Plant:
+    return sample("bush", 500)
+
+
+@pytest.fixture(scope="module")
+def bench(plant: Plant) -> Iterator[Bench]:
+    with PlantBuffers(plant) as buffers:
+        yield set_up(buffers, OPTIONS)
+
+
+@pytest.fixture(scope="module")
+def made(bench: Bench) -> dict[str, tuple[Row, Any]]:
+    """Rows and pictures that need nothing installed."""
+    todo = [e for e in entries(OPTIONS) if e.family in ("live", "kmeans", "octahedral")]
+    return {e.name: measured(bench, e, sizes_of(e, todo)) for e in todo}
+
+
+def entry(name: str) -> Entry:
+    return next(e for e in entries(OPTIONS) if e.name == name)
+
+
+def test_the_row_is_what_measuring_by_hand_gives(
+    bench: Bench, made: dict[str, tuple[Row, Any]]
+) -> None:
+    level = entry("kmeans 30").make(bench.buffers, silent).shown
+    assert isinstance(level, Level)
+    row, _ = made["kmeans 30"]
+    found = scores(bench.truths, level)
+    for metric, values in found.values.items():
+        np.testing.assert_array_equal(np.array(row.values[metric]), values)
+    assert row.cost.triangles == level.triangles
+    assert row.cost.texels == level.texels
+    assert row.cost.bytes == len(level_glb(level, "level"))
+    assert set(row.cost.seconds) == set(level.seconds)
+    assert row.cost.frame.frames >= 30
+    assert row.scores.distance_m.tolist() == bench.truths.distance_m.tolist()
+
+
+def test_bounds_are_of_billboards_and_fall_with_distance(made: dict[str, tuple[Row, Any]]) -> None:
+    """Ten times as far, a tenth of the pixels; e_p is never more than what bounds it."""
+    row, _ = made["kmeans 30"]
+    projection, bound = np.array(row.projection_px), np.array(row.bound_px)
+    assert (np.diff(projection) < 0).all()
+    assert (projection <= bound * (1 + 1e-9)).all()
+    assert row.within_pixels_from_m is not None
+    live, _ = made["live"]
+    assert live.projection_px == ()
+    assert live.within_pixels_from_m == 0.0
+
+
+def test_an_impostor_counts_with_all_its_frames(made: dict[str, tuple[Row, Any]]) -> None:
+    row, _ = made["octahedral"]
+    assert (row.cost.triangles, row.cost.texels) == (2, 2 * 2048**2)
+    assert row.cost.bytes is None, "no file holds one"
+    assert row.bake_seconds > 0
+
+
+def test_pictures_of_all_rows_lie_on_each_other(
+    bench: Bench, made: dict[str, tuple[Row, Any]]
+) -> None:
+    truth = of_truth(bench.scene)
+    assert set(truth) == set(SIZES)
+    for _, pictures in made.values():
+        for size, images in pictures.items():
+            sides = {Image.open(BytesIO(data)).size for data in (*truth[size], *images)}
+            assert len(sides) == 1
+            assert 0.7 * size <= max(sides.pop()) <= 1.5 * size
+
+
+def test_each_family_stands_at_each_size_once() -> None:
+    todo = entries(OPTIONS)
+    for family in {e.family for e in todo}:
+        shown = [size for e in todo if e.family == family for size in sizes_of(e, todo)]
+        assert sorted(shown) == sorted(SIZES)
+
+
+def test_rows_of_a_family_are_one_chain(made: dict[str, tuple[Row, Any]]) -> None:
+    """By hand: live errs 0.2 everywhere; 30 billboards suffice from 20 m on, 4 from 80 m on."""
+    rows = [row for row, _ in made.values()]
+
+    def erring(row: Row, flips: list[float]) -> Row:
+        values = {**row.values, "flip": tuple((f, f) for f in flips)}
+        return replace(row, distance_m=(10.0, 20.0, 40.0, 80.0, 160.0), values=values)
+
+    by_name = {row.name: row for row in rows}
+    chain = [
+        erring(by_name["live"], [0.2] * 5),
+        erring(by_name["kmeans 30"], [0.3, 0.2, 0.1, 0.1, 0.3]),
+        erring(by_name["kmeans 4"], [0.3, 0.3, 0.3, 0.2, 0.1]),
+        erring(by_name["octahedral"], [0.3, 0.3, 0.3, 0.3, 0.3]),
+    ]
+    live, finer, coarser, impostor = _with_distances(chain, OPTIONS)
+    assert live.switch_distance_m == 0.0
+    assert finer.switch_distance_m == pytest.approx(20.0, rel=0.01)
+    assert coarser.switch_distance_m == pytest.approx(80.0, rel=0.01)
+    assert impostor.switch_distance_m is None
+    assert impostor.why_not
+
+
+def test_a_digest_is_of_what_can_be_seen(plant: Plant) -> None:
+    material = plant.materials[0]
+    assert material.color_texture is not None
+    pixels = np.array(material.color_texture.pixels)
+    pixels[0, 0, 0] ^= 1
+    other = replace(material, color_texture=replace(material.color_texture, pixels=pixels))
+    painted = replace(plant, materials=(other, *plant.materials[1:]))
+    moved = replace(plant, positions=plant.positions + 1e-9)
+    duller = replace(plant, materials=(replace(material, roughness=0.1), *plant.materials[1:]))
+    assert _digest(replace(plant, source="elsewhere.glb")) == _digest(plant)
+    assert len({_digest(p) for p in (plant, painted, moved, duller)}) == 4
+
+
+def test_progress_rises_to_one_whatever_is_skipped() -> None:
+    said: list[float] = []
+    clock = _Clock(lambda stage, fraction: said.append(fraction), 4.0)
+    clock.skip(2.0)
+    for _ in range(2):
+        with clock.work("row", 1.0) as progress:
+            progress("making", 0.0)
+            progress("measuring", 0.5)
+            progress("done", 1.0)
+    assert said == [0.0, 0.25, 0.5, 0.5, 0.75, 1.0]
