@@ -28,6 +28,9 @@ from vegtool.progress import Progress, silent
 QUICK_VIEWS, FULL_VIEWS = 6, 12
 """Six leave a standard error of about 0.005 FLIP in the mean of a leafy plant, twelve 0.003."""
 FULL_LADDER = tuple(LADDER[0] / 2 ** (i / 2) for i in range(2 * len(LADDER) - 1))
+MAGNIFIED = 2.0
+"""Pixels that a texel may cover: no level is used nearer than half the distance that its atlas was
+made for. What is smeared so is seen sooner than a mean error over the picture tells."""
 SMALLEST = 3.0
 """Pixels. Where no level suffices at the usual sizes, smaller ones are tried down to this one."""
 HELD_OUT_VIEWS, HELD_OUT_PHASE = 12, 0.5
@@ -57,6 +60,7 @@ def with_distances(
         if options.max_pixels is None:
             return tuple(levels), ()
         return _by_bound(plant, levels, least_m)
+    least_m = [max(pair) for pair in zip(least_m, _by_texels(levels, display), strict=True)]
     with ExitStack() as stack:
         return _by_error(_Bench(stack, plant, levels, options, display), least_m, progress)
 
@@ -160,6 +164,11 @@ class _Bench:
         return [scores(truth, self._drawn[index]) for index in which]
 
 
+def _by_texels(levels: Sequence[Level], display: Display) -> list[float]:
+    """Metres from which a texel of each level covers no more than MAGNIFIED pixels."""
+    return [display.distance_m(MAGNIFIED * level.texels_per_metre) for level in levels]
+
+
 def _by_bound(
     plant: Plant, levels: Sequence[Level], least_m: Sequence[float]
 ) -> tuple[tuple[Level, ...], tuple[str, ...]]:
@@ -178,7 +187,7 @@ def _by_bound(
 def _by_error(
     bench: _Bench, least_m: Sequence[float], progress: Progress
 ) -> tuple[tuple[Level, ...], tuple[str, ...]]:
-    """Distances by measured error, and no less than `least_m`."""
+    """Distances by measured error, and no less than `least_m`, (l,) metres."""
     options = bench.options
 
     def holds(level: int, distance_m: float) -> bool:
