@@ -95,6 +95,16 @@ def test_a_driver_that_cannot_multisample_is_named(tree, monkeypatch):
     assert picture_of(tree, camera_of(tree), supersample=2).any(), "the truth needs none"
 
 
+def test_a_driver_without_half_float_targets_is_named(tree, monkeypatch):
+    def refuse(*_):
+        raise moderngl.Error("the framebuffer is not complete")
+
+    monkeypatch.setattr(targets, "_kept", {})
+    monkeypatch.setattr(moderngl.Context, "framebuffer", refuse)
+    with pytest.raises(CapabilityError, match="half-float"):
+        picture_of(tree, camera_of(tree))
+
+
 def test_fragments_are_counted_whatever_hides_or_cuts_out(tree):
     """Two squares of 32 x 32 pixels, one behind the other, cut out everywhere; half seen, one."""
     leaf = Material("leaf", base_color=[1, 1, 1, 0.0], alpha_mode="mask", double_sided=True)

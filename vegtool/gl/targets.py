@@ -22,7 +22,7 @@ STEP = 128
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """A framebuffer of half-float colour and depth, or of float colour alone (`kind` "pixels")."""
+    """A framebuffer of half-float colour and depth, or of float colour alone."""
 
     frame: moderngl.Framebuffer
     color: moderngl.Texture
@@ -53,7 +53,7 @@ def drawing_target(ctx: moderngl.Context, size: tuple[int, int], samples: int) -
         raise CapabilityError(
             f"pictures as a client shows them need {samples}x multisampling; "
             f"{describe(ctx).renderer} does {ctx.max_samples}x. Use a driver that can, such as "
-            "Mesa 20.1 or newer."
+            "Mesa 20.2 or newer."
         )
     return _target(ctx, size, samples)
 
@@ -81,8 +81,15 @@ def _made(ctx: moderngl.Context, size: tuple[int, int], samples: int | None) -> 
     if samples is None:
         color = ctx.texture(size, 4, dtype="f4")
         return Target(ctx.framebuffer([color]), color, None)
-    color = ctx.texture(size, 4, dtype="f2", samples=samples)
+    try:
+        color = ctx.texture(size, 4, dtype="f2", samples=samples)
+        depth = ctx.depth_renderbuffer(size, samples=samples)
+        frame = ctx.framebuffer([color], depth)
+    except moderngl.Error as error:
+        raise CapabilityError(
+            f"{describe(ctx).renderer} cannot draw half-float pictures with {samples} samples a "
+            f"pixel ({error}). Update the graphics driver, or use Mesa's."
+        ) from error
     if not samples:
         color.filter = (moderngl.NEAREST, moderngl.NEAREST)
-    depth = ctx.depth_renderbuffer(size, samples=samples)
-    return Target(ctx.framebuffer([color], depth), color, depth)
+    return Target(frame, color, depth)
