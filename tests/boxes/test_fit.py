@@ -193,3 +193,11 @@ def test_real_clusters_against_trimesh(models: Path, name: str) -> None:
     excess /= np.maximum(theirs, floor[:, None]).prod(axis=1)
     assert np.median(excess) <= 1.0
     assert np.quantile(excess, 0.95) <= 1.05
+
+
+def test_how_many_blocks_are_taken_at_once_changes_nothing(monkeypatch) -> None:
+    points = np.random.default_rng(1).normal(size=(20_000, 3)) * [3, 2, 1]
+    here = fit_boxes(points, one(points), 1)
+    monkeypatch.setattr("vegtool.boxes.fit.BLOCKS", 3)
+    there = fit_boxes(points, one(points), 1)
+    assert np.array_equal(here.half, there.half) and np.array_equal(here.axes, there.axes)
