@@ -106,27 +106,45 @@ def test_each_family_stands_at_each_size_once() -> None:
         assert sorted(shown) == sorted(SIZES)
 
 
-def test_rows_of_a_family_are_one_chain(made: dict[str, tuple[Row, Any]]) -> None:
-    """By hand: live errs 0.2 everywhere; 30 billboards suffice from 20 m on, 4 from 80 m on."""
-    rows = [row for row, _ in made.values()]
+def chain(made: dict[str, tuple[Row, Any]]) -> list[Row]:
+    """Live errs 0.2 everywhere; by error 30 billboards suffice from 20 m on, 4 from 80 m on."""
 
-    def erring(row: Row, flips: list[float]) -> Row:
+    def erring(name: str, *flips: float) -> Row:
+        row, _ = made[name]
         values = {**row.values, "flip": tuple((f, f) for f in flips)}
-        return replace(row, distance_m=(10.0, 20.0, 40.0, 80.0, 160.0), values=values)
+        distances = (10.0, 20.0, 40.0, 80.0, 160.0)
+        return replace(row, distance_m=distances, values=values, texels_per_metre=0.0)
 
-    by_name = {row.name: row for row in rows}
-    chain = [
-        erring(by_name["live"], [0.2] * 5),
-        erring(by_name["kmeans 30"], [0.3, 0.2, 0.1, 0.1, 0.3]),
-        erring(by_name["kmeans 4"], [0.3, 0.3, 0.3, 0.2, 0.1]),
-        erring(by_name["octahedral"], [0.3, 0.3, 0.3, 0.3, 0.3]),
+    return [
+        erring("live", 0.2, 0.2, 0.2, 0.2, 0.2),
+        erring("kmeans 30", 0.3, 0.2, 0.1, 0.1, 0.3),
+        erring("kmeans 4", 0.3, 0.3, 0.3, 0.2, 0.1),
+        erring("octahedral", 0.3, 0.3, 0.3, 0.3, 0.3),
     ]
-    live, finer, coarser, impostor = _with_distances(chain, OPTIONS)
+
+
+def test_rows_of_a_family_are_one_chain(made: dict[str, tuple[Row, Any]]) -> None:
+    """What errs far away may be used near by, where a coarser one follows."""
+    live, finer, coarser, impostor = _with_distances(chain(made), OPTIONS)
     assert live.switch_distance_m == 0.0
     assert finer.switch_distance_m == pytest.approx(20.0, rel=0.01)
     assert coarser.switch_distance_m == pytest.approx(80.0, rel=0.01)
     assert impostor.switch_distance_m is None
     assert impostor.why_not
+
+
+def test_coarse_texels_and_displacement_move_distances_away(
+    made: dict[str, tuple[Row, Any]],
+) -> None:
+    live, finer, coarser, impostor = chain(made)
+    half = OPTIONS.display.pixels_per_metre(30.0) / 2  # a texel covers two pixels from 30 m on
+    rows = [live, replace(finer, texels_per_metre=half), coarser, impostor]
+    assert _with_distances(rows, OPTIONS)[1].switch_distance_m == pytest.approx(30.0, rel=0.01)
+    limited = replace(OPTIONS, max_pixels=1.0)
+    bounded = [replace(row, within_pixels_from_m=40.0) for row in rows[:3]]
+    found = _with_distances([*bounded, impostor], limited)
+    assert found[1].switch_distance_m == pytest.approx(40.0, rel=0.01)
+    assert found[3].why_not == "how far it displaces things is not known"
 
 
 def test_a_digest_is_of_what_can_be_seen(plant: Plant) -> None:

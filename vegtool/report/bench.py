@@ -108,7 +108,9 @@ def _with_bounds(row: Row, bench: Bench, level: Level) -> Row:
     if level.billboards is None and level.geometric_error_m is None:
         return row
     row = replace(
-        row, within_pixels_from_m=distance_for_pixels(level, plant.center, display, pixels)
+        row,
+        texels_per_metre=level.texels_per_metre,
+        within_pixels_from_m=distance_for_pixels(level, plant.center, display, pixels),
     )
     billboards, atlas = level.billboards, level.atlas
     if billboards is None or atlas is None:

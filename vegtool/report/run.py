@@ -22,6 +22,7 @@ from vegtool import __version__
 from vegtool.errors import CapabilityError, VegtoolError
 from vegtool.formats import ReadOptions, read_plant
 from vegtool.gl.upload import PlantBuffers
+from vegtool.measure.chain import MAGNIFIED
 from vegtool.measure.distances import LeftOut, limits, switch_distances
 from vegtool.measure.pictures import renderer
 from vegtool.plant import Plant
@@ -161,22 +162,36 @@ def _with_distances(rows: Sequence[Row], options: ReportOptions) -> list[Row]:
     """The rows with the distances from which they may be used: those of a family as one chain."""
     live = next(row for row in rows if row.name == LIVE)
     limit = limits(live.mean("flip"), options.max_error)
-    found = []
+    least_m = {row.name: _least_m(row, options) for row in rows if row is not live}
+    starts: dict[str, float | LeftOut] = {}
     for family in dict.fromkeys(row.family for row in rows):
-        chain = [row for row in rows if row.family == family]
-        least_m = None
-        if options.max_pixels is not None:
-            least_m = [row.within_pixels_from_m or 0.0 for row in chain]
+        chain = [row for row in rows if row.family == family and least_m.get(row.name) is not None]
         errors = [row.mean("flip") for row in chain]
-        starts = switch_distances(np.array(live.distance_m), errors, limit, least_m)
-        for row, start in zip(chain, starts, strict=True):
-            if row is live:
-                found.append(replace(row, switch_distance_m=0.0))
-            elif isinstance(start, LeftOut):
-                found.append(replace(row, why_not=start.value))
-            else:
-                found.append(replace(row, switch_distance_m=start))
-    return found
+        least = [least_m[row.name] or 0.0 for row in chain]
+        found = switch_distances(np.array(live.distance_m), errors, limit, least)
+        starts |= {row.name: start for row, start in zip(chain, found, strict=True)}
+    return [
+        replace(row, switch_distance_m=0.0) if row is live else _starting(row, starts.get(row.name))
+        for row in rows
+    ]
+
+
+def _least_m(row: Row, options: ReportOptions) -> float | None:
+    """Metres from which a row's texels are small enough, and what it displaces little enough; None
+    where that is not known."""
+    texels = row.texels_per_metre
+    near = options.display.distance_m(MAGNIFIED * texels) if texels else 0.0
+    if options.max_pixels is None:
+        return near
+    return None if row.within_pixels_from_m is None else max(near, row.within_pixels_from_m)
+
+
+def _starting(row: Row, start: float | LeftOut | None) -> Row:
+    if start is None:
+        return replace(row, why_not="how far it displaces things is not known")
+    if isinstance(start, LeftOut):
+        return replace(row, why_not=start.value)
+    return replace(row, switch_distance_m=start)
 
 
 def _digest(plant: Plant) -> str:
