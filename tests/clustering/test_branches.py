@@ -63,10 +63,21 @@ def test_more_trunks_than_clusters_are_merged_by_nearness() -> None:
     assert labels.tolist() == np.repeat([0, 1, 2], 12).tolist()
 
 
-def test_one_branch_alone_is_kmeans() -> None:
+def test_one_branch_alone_is_isodata() -> None:
     plant = plant_of(cards(100), random_branches(200, 1))
     labels = cluster(plant, "branches", 9)
-    assert same_partition(labels, cluster(plant, "kmeans", 9))
+    assert same_partition(labels, cluster(plant, "isodata", 9))
+
+
+def test_a_bent_branch_is_cut_where_it_bends() -> None:
+    """Two arms of one branch at a right angle, 20 small triangles along each: two clusters are the
+    arms, not a near and a far part of both."""
+    triangle = 0.01 * np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    steps = np.linspace(0.05, 1.0, 20)
+    arms = [triangle + step * axis for axis in np.eye(3)[:2] for step in steps]
+    bent = Branches(np.zeros(40), np.array([-1]), np.array([0]), "generator")
+    labels = cluster(plant_of(np.stack(arms), bent), "branches", 2)
+    assert labels.tolist() == [0] * 20 + [1] * 20
 
 
 def test_plant_that_knows_no_branches() -> None:

@@ -33,18 +33,24 @@ class ClusterOptions:
     of the tensors n n^T; two faces at right angles are sqrt 2 apart) in a clustering of 500. It
     grows and shrinks with the clusters, as the cube root of 500 / count. 0, the default, is the
     paper: positions alone; docs/methods/kmeans.md has the measurement.
-    elongation: how many times as long as wide the clusters of `isodata` shall be; 1 is compact.
+    elongation: how many times as long as wide the clusters of `isodata` and `branches` shall be; 1
+    is compact.
     strict_level: `branches` stops at the branching level, as in the paper, and leaves the rest of
     the count unused.
     """
 
     orientation_weight: float = 0.0
-    elongation: float = 2.0
+    elongation: float = 3.0
     strict_level: bool = False
 
     def orientation_scale(self, count: int) -> float:
         """Plant radii per unit of face orientation, for that many clusters."""
         return float(self.orientation_weight * (500 / count) ** (1 / 3))
+
+    def line_scale(self, count: int) -> float:
+        """The same where clusters are lines: their length counts for less, hence positions on the
+        whole, and orientation with them."""
+        return self.orientation_scale(count) / float(self.elongation ** (1 / 3))
 
     def __post_init__(self) -> None:
         if not 0 <= self.orientation_weight <= 1e3:
@@ -55,7 +61,7 @@ class ClusterOptions:
         if not 1 <= self.elongation <= 1e3:
             raise UsageError(
                 f"elongation: expected 1 to 1000, got {self.elongation}"
-                "; 1 makes compact clusters, 2 is the default"
+                "; 1 makes compact clusters, 3 is the default"
             )
 
 

@@ -6,10 +6,11 @@ one cluster per branch fits the count; a branch of that level brings all its des
 above it its own faces (`covered_level`).
 
 That is `strict_level`, and it leaves the rest of the count unused. Otherwise the level is one that
-is covered with PER_BRANCH clusters for each branch, and k-means cuts the branches with the largest
-error until the count is reached, never joining parts of two of them. Where no branching level is
-covered, the trunks' own wood still has clusters of its own: mixed with what grows around it, it
-would be drawn on planes that stand across it, in pieces.
+is covered with PER_BRANCH clusters for each branch, and those that cost most are cut into lines
+(`lines.py`) until the count is reached, never joining parts of two branches: "the clusters can be
+oriented along the branches". Where no branching level is covered, the trunks' own wood still has
+clusters of its own: mixed with what grows around it, it would be drawn on planes that stand across
+it, in pieces.
 """
 
 from __future__ import annotations
@@ -19,12 +20,13 @@ import numpy as np
 from vegtool.arrays import IntArray
 from vegtool.clustering import ClusterOptions
 from vegtool.clustering.features import coarse, samples, spread_to
-from vegtool.clustering.kmeans import settle
+from vegtool.clustering.lines import settle_lines
 from vegtool.clustering.partition import compacted, merge
 from vegtool.plant import Branches, Plant
 from vegtool.progress import Progress
 
-PER_BRANCH = 2  # clusters per branch, on average
+PER_BRANCH = 4  # clusters per branch, on average
+PER_TRUNK = 2  # the same where trunks are told from what grows on them
 
 
 def branches(
@@ -40,18 +42,17 @@ def branches(
     if level == 0 and not options.strict_level:
         own_wood = (known.level[known.face_branch] == 0) & ~plant.face_is_leaf
         apart = 2 * owner + own_wood
-        owner = apart if len(np.unique(apart)) <= count // each else owner
+        owner = apart if len(np.unique(apart)) <= count // PER_TRUNK else owner
     group = compacted(owner)
     covered = int(group.max()) + 1
     if covered == count or (covered < count and options.strict_level):
         return group.astype(np.int32)
-    fine = samples(plant, options.orientation_scale(count), count, group)
-    few = coarse(fine, count, group)
+    few = coarse(samples(plant, options.line_scale(count), count, group), count, group)
     of_point = spread_to(few.of_face, group)
     if covered > count:  # more trunks than clusters
         labels = merge(few.points, few.weights, of_point, count)
     else:
-        labels = settle(few, of_point, count, of_point)
+        labels = settle_lines(few, of_point, count, options.elongation, of_point, progress)
     return labels[few.of_face].astype(np.int32)
 
 

@@ -49,15 +49,22 @@ def split(points: FloatArray, weights: FloatArray, labels: Labels, count: int) -
     return labels
 
 
-def cut(offset: FloatArray, weights: FloatArray, labels: Labels, worst: int) -> Labels:
-    """Cut the `worst` clusters with the largest error in two, each at its mean.
+def cut(
+    offset: FloatArray,
+    weights: FloatArray,
+    labels: Labels,
+    worst: int,
+    cost: FloatArray | None = None,
+) -> Labels:
+    """Cut the `worst` clusters with the largest error, or `cost` (k,), in two, each at its mean.
 
     offset: (n, d) points relative to their cluster's mean, in any frame of the cluster's; the cut
     lies across the axis along which the cluster varies most.
     """
     k = int(labels.max()) + 1
     variance = np.stack([np.bincount(labels, weights * column**2) for column in offset.T], axis=1)
-    chosen = np.argsort(-variance.sum(axis=1), kind="stable")[:worst]
+    cost = variance.sum(axis=1) if cost is None else cost
+    chosen = np.argsort(-cost, kind="stable")[:worst]
     new = np.full(k, -1)
     new[chosen] = k + np.arange(len(chosen))
     side = offset[np.arange(len(offset)), variance.argmax(axis=1)[labels]] > 0
