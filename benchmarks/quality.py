@@ -97,6 +97,7 @@ def compare(model: Path, folder: Path, options: list[str]) -> list[dict[str, Any
     original = folder / "original.glb"
     original.write_bytes(plant_glb(plant))
     command = [sys.executable, "-m", "vegtool", "convert", str(original), "-q", *options]
+    command += ["--measure", "off"]  # all three levels, at the distances above
     subprocess.run([*command, "-o", str(folder / "out")], check=True)
     manifest = json.loads((folder / "out" / "original.lod.json").read_text())
     drawn: dict[str, list[Path]] = {
