@@ -17,6 +17,7 @@ import os
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from textwrap import fill
 from time import monotonic
 from typing import Any
 
@@ -76,30 +77,31 @@ def rows(made: Report) -> list[dict[str, Any]]:
 
 def document(made: Report) -> str:
     """docs/error_against_time.md."""
-    of_all = medians(made.plants)
-    blocks = [
-        "# Error against time",
+    said = (
         "What stands in for a plant at a distance: how far it is from the truth (FLIP, mean ± "
-        "standard deviation), what it takes to make and to draw. Made by `python "
-        "benchmarks/report.py --record`; the number in a row's name is its budget of billboards, "
-        "and mesh reductions get the triangles of so many, two each. What each column means: "
+        "standard deviation over views, or over plants), what it takes to make and to draw. Made "
+        "by `python benchmarks/report.py --record`. The number in a row's name is its budget of "
+        "billboards; mesh reductions get the triangles of so many, two each. What each row is: "
         "[vegtool report](commands/report.md).",
-        f"vegtool {made.version}, {made.options['view_count']} views, drawn by {made.renderer}. "
-        "Times compare rows of this page only; a frame is stated over that of the live original.",
-        "![Error against the time to make it](error_against_time.png)",
-        f"## Medians of {len(made.plants)} plants",
-        _table(of_all),
-    ]
+        f"vegtool {made.version}, {made.options['view_count']} views all around, drawn by "
+        f"{made.renderer}. Times compare rows of this page only; a frame is stated over that of "
+        "the live original.",
+    )
+    blocks = ["# Error against time", *(fill(text, 100) for text in said)]
+    blocks += ["![Error against the time to make it](error_against_time.png)"]
+    blocks += [f"## Medians of {len(made.plants)} plants", _table(medians(made.plants))]
     for plant in made.plants:
-        blocks += [
-            f"## {plant.name}",
-            f"{plant.triangles:,} triangles.",
-            _table(points(plant)),
-        ]
-        blocks += [
-            f"Not in the table: {note}" for note in plant.notes if note.startswith("gltfpack")
-        ]
+        blocks += [f"## {plant.name}", f"{plant.triangles:,} triangles.", _table(points(plant))]
+        blocks += [f"Not in the table: {n}" for n in plant.notes if n.startswith("gltfpack")]
     return "\n\n".join(blocks) + "\n"
+
+
+def write_page(made: Report) -> None:
+    """docs/error_against_time.md and its plot."""
+    PAGE.write_text(document(made), encoding="utf-8")
+    title = f"Error against the time to make it: medians of {len(made.plants)} plants"
+    figure = error_against(medians(made.plants), COSTS[0], title)
+    PAGE.with_suffix(".png").write_bytes(png(figure))
 
 
 def _table(found: Sequence[Point]) -> str:
@@ -141,10 +143,7 @@ def main() -> None:
     print(f"{monotonic() - start:.1f} s for {len(made.plants)} plants")
     if known.record:
         record("report", rows(made))
-        PAGE.write_text(document(made), encoding="utf-8")
-        title = f"Error against the time to make it: medians of {len(made.plants)} plants"
-        figure = error_against(medians(made.plants), COSTS[0], title)
-        PAGE.with_suffix(".png").write_bytes(png(figure))
+        write_page(made)
 
 
 if __name__ == "__main__":

@@ -91,7 +91,7 @@ class Labels:
             bool((np.minimum(high, other[1]) > np.maximum(low, other[0])).all())
             for other in self._boxes
         )
-        outside = (low < self._inside[0]).any() or (high[1] > self._inside[1, 1])
+        outside = (low < self._inside[0]).any() or (high > self._inside[1]).any()
         return float(covered + 20 * over + 50 * outside)
 
     def _places(self, line: Line) -> FloatArray:

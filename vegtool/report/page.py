@@ -88,7 +88,7 @@ def _all_plants(report: Report) -> str:
     return (
         f"<p>Medians over {len(report.plants)} plants: {escape(names)}.</p>"
         + _closest(found)
-        + _plots(found, f"median of {len(report.plants)} plants")
+        + _plots(found, f"medians of {len(report.plants)} plants")
         + _tables(found)
     )
 

@@ -35,7 +35,7 @@ def check_folder(folder: Path, force: bool, inputs: Iterable[Path]) -> None:
 
 def write(report: Report, folder: Path, force: bool, inputs: Iterable[Path]) -> list[Path]:
     """Write the three files, all or none. Raises OutputError as FileSet does."""
-    contents = (json.dumps(encoded(report), indent=1), csv_text(report), page(report))
+    contents = (json.dumps(encoded(report)), csv_text(report), page(report))
     with FileSet(folder, force, inputs) as files:
         for name, text in zip(FILES, contents, strict=True):
             files.add(name, text.encode())
