@@ -40,8 +40,8 @@ def test_a_third_of_the_billboards_at_twice_the_distance(chain: LodChain) -> Non
         assert level.billboards is not None
         assert 0 < len(level.billboards) <= most
     near = [level.near_distance_m for level in levels]
-    assert near[1] == pytest.approx(2 * near[0])
-    assert near[2] >= near[1]
+    assert near[1] == pytest.approx(2 * near[0], rel=0.01), "rounded up"
+    assert near[2] == pytest.approx(2 * near[1], rel=0.05)
 
 
 def test_fewer_billboards_are_made_for_smaller_sizes() -> None:
@@ -50,7 +50,7 @@ def test_fewer_billboards_are_made_for_smaller_sizes() -> None:
     assert near_pixels(512 // 9) == pytest.approx(50, rel=0.02)
     sizes = [near_pixels(count) for count in range(1, 100_000, 77)]
     assert all(a <= b for a, b in pairwise(sizes))
-    assert sizes[0] >= 16, "a picture needs some texels"
+    assert sizes[0] >= 8, "a picture needs some texels"
     assert sizes[-1] <= 1080, "no plant need be larger than the screen"
 
 
@@ -58,8 +58,8 @@ def test_one_texel_per_pixel_at_the_near_end(chain: LodChain, bush: Plant) -> No
     level = chain.levels[1]
     size = np.ptp(bush.bounds, axis=0).max()
     density = chain.display.pixels_per_metre(level.near_distance_m)
-    assert size * density == pytest.approx(near_pixels(OPTIONS.billboards))
-    assert level.texels_per_metre == pytest.approx(density)
+    assert size * density == pytest.approx(near_pixels(OPTIONS.billboards), rel=0.01)
+    assert level.texels_per_metre == pytest.approx(density, rel=0.01)
 
 
 def test_the_original_comes_first_and_every_option_is_written_down(

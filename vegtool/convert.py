@@ -33,7 +33,7 @@ LEVEL_RATIO = 3
 NEAR_PIXELS = (200.0, 512)
 """Size of a plant on the screen (pixels, its longest side) that so many billboards are made for."""
 
-NEAR_LIMITS = (16.0, 1024.0)
+NEAR_LIMITS = (8.0, 1024.0)
 """Pixels. Below, even one billboard's picture has too few texels to be one; above, a plant is as
 large as the screen."""
 

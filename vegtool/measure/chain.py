@@ -52,14 +52,15 @@ def with_distances(
     levels: coarser and coarser, without the original. Raises QualityError where none keeps to
     `max_error` at any size, UsageError where no size is seen from outside the plant.
     """
-    least_m = [0.0] * len(levels)
     if options.max_pixels is not None:
         pixels = options.max_pixels
         least_m = [distance_for_pixels(level, plant.center, display, pixels) for level in levels]
+    elif options.measure == "off":
+        least_m = [level.near_distance_m for level in levels]
+    else:
+        least_m = [0.0] * len(levels)
     if options.measure == "off":
-        if options.max_pixels is None:
-            return tuple(levels), ()
-        return _by_bound(plant, levels, least_m)
+        return _unmeasured(plant, levels, least_m)
     least_m = [max(pair) for pair in zip(least_m, _by_texels(levels, display), strict=True)]
     with ExitStack() as stack:
         return _by_error(_Bench(stack, plant, levels, options, display), least_m, progress)
@@ -169,10 +170,10 @@ def _by_texels(levels: Sequence[Level], display: Display) -> list[float]:
     return [display.distance_m(MAGNIFIED * level.texels_per_metre) for level in levels]
 
 
-def _by_bound(
+def _unmeasured(
     plant: Plant, levels: Sequence[Level], least_m: Sequence[float]
 ) -> tuple[tuple[Level, ...], tuple[str, ...]]:
-    """Distances by calculation alone."""
+    """Levels from `least_m` metres on, where that is outside the plant."""
     nothing = np.zeros(1)
     near = np.array([CLOSEST * plant.radius])
     starts = switch_distances(near, [nothing] * len(levels), nothing, least_m)
