@@ -189,7 +189,11 @@ def report_command(
 
     sources = {job.name: job.source for job in find_jobs(inputs)}
     with console.bar("report") as progress:
-        found = make_report(sources, report, read, out, force, progress)
+        try:
+            found = make_report(sources, report, read, out, force, progress)
+        except KeyboardInterrupt:
+            console.say("rows that are finished are kept: the same command goes on from there")
+            raise
     from vegtool.report.text import as_summary, summary_text  # draws, which may not be possible
 
     for plant in found.plants:

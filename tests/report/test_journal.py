@@ -59,3 +59,9 @@ def test_nothing_is_left_of_a_whole_report(tmp_path: Path) -> None:
         journal.add("oak", "live", {"row": 1})
         journal.remove()
     assert not list(tmp_path.iterdir())
+
+
+def test_nothing_is_left_where_nothing_was_finished(tmp_path: Path) -> None:
+    with pytest.raises(KeyboardInterrupt), Journal(tmp_path / "new" / "folder", "key"):
+        raise KeyboardInterrupt
+    assert not list(tmp_path.iterdir())

@@ -19,6 +19,8 @@ NAME = "report.unfinished.jsonl"
 class Journal:
     """The journal of one report in its folder; a context manager, kept until `remove`.
 
+    Nothing is kept of a report that finished nothing, not even the folders made for it.
+
     key: a digest of what shapes every row: options and version. `force` begins anew where the
     folder holds a journal of another key; else OutputError says so.
     """
@@ -27,6 +29,7 @@ class Journal:
         self._path = folder / NAME
         self._done: dict[tuple[str, str], Any] = {}
         kept = self._read(key, force)
+        self._missing_folders = [p for p in (folder, *folder.parents) if not p.exists()]
         folder.mkdir(parents=True, exist_ok=True)
         whole = self._path.with_suffix(".new")
         self._file = whole.open("w", encoding="utf-8")
@@ -42,6 +45,12 @@ class Journal:
 
     def __exit__(self, *error: object) -> None:
         self._file.close()
+        if self._done:
+            return
+        self._path.unlink(missing_ok=True)
+        for folder in self._missing_folders:
+            if not any(folder.iterdir()):
+                folder.rmdir()
 
     def get(self, plant: str, piece: str) -> Any | None:
         """The value that was added for a piece of work on a plant (its digest), or None."""
