@@ -8,7 +8,7 @@ from cluster_cases import cards
 from plants import plant_of
 
 from vegtool.clustering.features import samples
-from vegtool.clustering.lines import cost, lines, settle_lines
+from vegtool.clustering.lines import cost, largest_eigenvalue, lines, settle_lines
 
 
 def test_what_lies_on_a_line_costs_its_discounted_length_alone() -> None:
@@ -35,3 +35,18 @@ def test_clusters_keep_to_their_groups(groups: int) -> None:
     assert np.array_equal(np.unique(labels), np.arange(40))
     for label in range(40):
         assert len(np.unique(group[labels == label])) == 1
+
+
+def test_largest_eigenvalue_is_lapacks() -> None:
+    """Also where two or all are equal, and of nothing."""
+    random = np.random.default_rng(0)
+    turns = np.linalg.qr(random.normal(size=(500, 3, 3)))[0]
+    values = random.random((500, 3)) ** 4
+    values[:100, 1] = values[:100, 0]
+    values[100:200] = values[100:200, :1]
+    values[200:300, 1:] = 0.0
+    moment = np.einsum("kij,kj,klj->kil", turns, values, turns)
+    moment[-1] = 0.0
+    expected = np.linalg.eigvalsh(moment)[:, -1]
+    assert largest_eigenvalue(moment) == pytest.approx(expected, rel=1e-7, abs=0)
+    assert largest_eigenvalue(1e-20 * moment) == pytest.approx(1e-20 * expected, rel=1e-7, abs=0)
