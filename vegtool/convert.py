@@ -1,9 +1,9 @@
 """The pipeline for one plant: Plant and options in, a chain of levels out.
 
 After Colditz et al. 2005, section 2: clusters of the plant's faces, a box around each, one to three
-billboards per box, textures baked from the faces. Every billboard level is for twice the distance
-of the one before, with about a third of its billboards, and its atlas holds one texel per pixel at
-the level's near end.
+billboards per box, textures baked from the faces. Every billboard level is made for half the size
+on the screen of the one before, with about a third of its billboards, and its atlas holds one texel
+per pixel at that size. From where it may be used is measured then (measure/chain.py).
 """
 
 from __future__ import annotations
@@ -64,7 +64,12 @@ class ConvertOptions:
         most=100_000,
         short="b",
     )
-    levels: int = option(4, "Billboard levels, each for twice the distance.", least=1, most=12)
+    levels: int = option(
+        4,
+        "Billboard levels to make, each of a third of the planes; those of no use are left out.",
+        least=1,
+        most=12,
+    )
     orientation_weight: float = option(
         ClusterOptions().orientation_weight,
         "How much clusters follow face orientation, beside position; 0 is the paper's method.",
@@ -108,7 +113,7 @@ def convert(
     """Make the chain of levels of one plant.
 
     levels[0] is the plant itself, the others are billboards: one at least, and no more than save
-    triangles and may be used somewhere. Raises UsageError for options out of range, QualityError
+    triangles and may be used somewhere; `notes` name the others. Raises UsageError for options out of range, QualityError
     where no level keeps to `measure.max_error`, CapabilityError where nothing can draw.
     """
     from vegtool.baking.bake import PlantBuffers
@@ -202,7 +207,7 @@ def billboard_counts(plant: Plant, options: ConvertOptions) -> list[int]:
 def near_pixels(count: int) -> float:
     """Size on the screen (pixels, the plant's longest side) that `count` billboards are made for.
 
-    A third of the billboards are for half the size, until measuring states the distance.
+    A third of the billboards are for half the size; an atlas is made for it.
     """
     pixels, billboards = NEAR_PIXELS
     size = float(pixels * (count / billboards) ** (log(2) / log(LEVEL_RATIO)))
