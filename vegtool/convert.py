@@ -113,8 +113,9 @@ def convert(
     """Make the chain of levels of one plant.
 
     levels[0] is the plant itself, the others are billboards: one at least, and no more than save
-    triangles and may be used somewhere; `notes` name the others. Raises UsageError for options out of range, QualityError
-    where no level keeps to `measure.max_error`, CapabilityError where nothing can draw.
+    triangles and may be used somewhere; `notes` name those that are of no use. Raises UsageError
+    for options out of range, QualityError where no level keeps to `measure.max_error`,
+    CapabilityError where nothing can draw.
     """
     from vegtool.baking.bake import PlantBuffers
     from vegtool.measure.chain import with_distances
