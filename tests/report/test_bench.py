@@ -65,7 +65,7 @@ def test_the_row_is_what_measuring_by_hand_gives(
     assert row.cost.bytes == len(level_glb(level, "level"))
     assert set(row.cost.seconds) == set(level.seconds)
     assert row.cost.frame.frames >= 30
-    assert row.scores.distance_m.tolist() == bench.truths.distance_m.tolist()
+    assert row.distance_m == tuple(bench.truths.distance_m)
 
 
 def test_bounds_are_of_billboards_and_fall_with_distance(made: dict[str, tuple[Row, Any]]) -> None:

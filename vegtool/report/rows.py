@@ -11,7 +11,7 @@ import numpy as np
 from vegtool.arrays import FloatArray
 from vegtool.lod import Spread
 from vegtool.measure.cost import Cost, FrameTime
-from vegtool.measure.scores import Scores, spread
+from vegtool.measure.scores import spread
 
 LIVE = "live"
 """Name of the original as a client draws it: the line to beat."""
@@ -60,12 +60,6 @@ class Row:
     def bake_seconds(self) -> float:
         """All stages together."""
         return sum(self.cost.seconds.values())
-
-    @property
-    def scores(self) -> Scores:
-        """The measured values as they were, for operations on them."""
-        values = {name: np.array(v) for name, v in self.values.items()}
-        return Scores(np.array(self.pixels), np.array(self.distance_m), values)
 
     def spread(self, metric: str, index: int) -> Spread:
         """A metric at one size, over the views."""
