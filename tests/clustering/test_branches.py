@@ -76,7 +76,8 @@ def test_a_bent_branch_is_cut_where_it_bends() -> None:
     steps = np.linspace(0.05, 1.0, 20)
     arms = [triangle + step * axis for axis in np.eye(3)[:2] for step in steps]
     bent = Branches(np.zeros(40), np.array([-1]), np.array([0]), "generator")
-    labels = cluster(plant_of(np.stack(arms), bent), "branches", 2)
+    plant = plant_of(np.stack(arms), bent)
+    labels = cluster(plant, "branches", 2, ClusterOptions(elongation=4.0))
     assert labels.tolist() == [0] * 20 + [1] * 20
 
 

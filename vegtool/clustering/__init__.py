@@ -40,7 +40,7 @@ class ClusterOptions:
     """
 
     orientation_weight: float = 0.0
-    elongation: float = 3.0
+    elongation: float = 2.0
     strict_level: bool = False
 
     def orientation_scale(self, count: int) -> float:
@@ -61,7 +61,7 @@ class ClusterOptions:
         if not 1 <= self.elongation <= 1e3:
             raise UsageError(
                 f"elongation: expected 1 to 1000, got {self.elongation}"
-                "; 1 makes compact clusters, 3 is the default"
+                "; 1 makes compact clusters, 2 is the default"
             )
 
 
