@@ -49,8 +49,8 @@ MAY_IMPORT: dict[str, set[str]] = {
 }  # fmt: skip
 
 HEAVY = (
-    "moderngl", "trimesh", "sklearn", "scipy", "PIL", "skimage", "matplotlib", "fast_simplification",
-    "numba", "pyrender",
+    "moderngl", "trimesh", "sklearn", "scipy", "PIL", "skimage", "matplotlib",
+    "fast_simplification", "numba", "pyrender",
 )  # fmt: skip
 
 

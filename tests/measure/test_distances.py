@@ -84,7 +84,7 @@ def test_no_nearer_than_is_asked() -> None:
     assert found == (LeftOut.SUPERSEDED, 3.0)
 
 
-def test_what_does_not_hold_between_distances_starts_at_the_next_one_measured() -> None:
+def test_what_holds_nowhere_between_distances_starts_at_the_next_one_measured() -> None:
     asked: list[tuple[int, float]] = []
 
     def never(level: int, distance_m: float) -> bool:
@@ -93,7 +93,16 @@ def test_what_does_not_hold_between_distances_starts_at_the_next_one_measured() 
 
     errors = [np.array([0.4, 0.3, 0.1, 0.1, 0.1])]
     assert switch_distances(METRES, errors, LIMIT, holds=never) == (4.0,)
-    assert asked == [(0, 2.83)]
+    assert asked == [(0, 2.83), (0, 3.37)], "where the lines cross, and halfway from there"
+
+
+def test_what_does_not_hold_where_lines_cross_may_hold_halfway_to_the_next_measured() -> None:
+    """The finer level then keeps its place before the coarser one, which starts at 4 m."""
+    crossing = np.array([0.4, 0.3, 0.1, 0.1, 0.1])
+    found = switch_distances(
+        METRES, [crossing, ALL_BELOW], LIMIT, [0, 4.0], holds=lambda level, distance: distance > 3
+    )
+    assert found == (3.37, 4.0)
 
 
 def test_limits_are_the_live_originals_own_but_not_below_the_floor() -> None:

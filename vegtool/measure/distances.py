@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from enum import Enum
-from math import exp, floor, log, log10
+from math import exp, floor, log, log10, sqrt
 
 import numpy as np
 
@@ -47,13 +47,12 @@ def switch_distances(
 
     distance_m: (d,) increasing, where was measured. errors: per level, finest first, (d,). limit:
     (d,). least_m: metres per level below which it is not used, whatever its error. holds: whether
-    a level keeps to the limit at a distance between those measured; where it does not, the next
-    one measured is taken.
+    a level keeps to the limit at a distance between those measured; where it does not, one halfway
+    to the next measured is asked for, and then that one taken.
 
     Between measured distances, errors and limits are taken to be linear in the logarithm of
-    distance; a level that would be used between two of them alone is left out. The last distance
-    stands for all beyond. Distances are rounded up to three digits, and increase by more than a
-    fade from each level to the next.
+    distance. The last distance stands for all beyond. Distances are rounded up to three digits,
+    and increase by more than a fade from each level to the next.
     """
     found: list[float | LeftOut] = []
     until, next_m = float(distance_m[-1]), np.inf
@@ -64,11 +63,13 @@ def switch_distances(
             continue
         least = 0.0 if least_m is None else rounded_up(least_m[level])
         from_m, behind_m = (max(rounded_up(m), least) for m in start)
-        if (1 + FADE_FRACTION) * behind_m > next_m:
+        halfway_m = rounded_up(sqrt(from_m * behind_m))
+        last = next_m / (1 + FADE_FRACTION)
+        tried = (from_m, halfway_m, behind_m)
+        from_m = next(m for m in tried if m >= behind_m or m > last or holds(level, m))
+        if from_m > last:
             found.append(LeftOut.SUPERSEDED)
             continue
-        if from_m < behind_m and not holds(level, from_m):
-            from_m = behind_m
         found.append(from_m)
         until, next_m = min((1 + FADE_FRACTION) * from_m, until), from_m
     return tuple(reversed(found))
