@@ -190,7 +190,7 @@ def error_against_distance(points: Sequence[Point], title: str, metric: str = "f
             axes.minorticks_off()
             axes.yaxis.set_major_locator(MaxNLocator(5))
             drawn.append(_distance_panel(axes, points, family, metric))
-        panels[0, 0].set_xlim(ticks[-1] * 1.6, ticks[0] / 1.25)  # near to far
+        panels[0, 0].set_xlim(ticks[-1] * 2.2, ticks[0] / 1.25)  # near to far
         panels[0, 0].set_ylim(bottom=0)
         for axes in panels.flat[len(shown) :]:
             axes.set_visible(False)
