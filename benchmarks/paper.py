@@ -196,7 +196,7 @@ def figure() -> None:
     plant = sample("dead-tree")
     towards = direction(20.0, 8.0)
     focal = CELL / (2 * np.tan(np.radians(FOV) / 2))
-    distance = 1.1 * plant.height * focal / CELL
+    distance = 1.2 * plant.height * focal / CELL
     camera = Camera(
         plant.center, towards, distance, focal, CELL, CELL, (CELL / 2, CELL / 2), 1.5 * plant.radius
     )
