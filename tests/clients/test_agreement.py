@@ -127,6 +127,11 @@ def on_grid(plant: Plant, camera: Camera) -> Plant:
     return replace(plant, positions=plant.positions + depth[:, None] * (step @ camera.axes[:2]))
 
 
+def put(plant: Plant, buffers: PlantBuffers) -> None:
+    """Draw these vertices from here on."""
+    buffers.vertices.write(vertex_data(plant, buffers.origin, buffers.scale).tobytes())
+
+
 @pytest.mark.parametrize("name", [f"{p} {kind}" for p in PLANTS for kind in ("original", "level")])
 def test_three_shows_what_we_show(name: str, cases: dict[str, list[Case]]) -> None:
     flip: dict[str, list[float]] = {}
@@ -135,11 +140,10 @@ def test_three_shows_what_we_show(name: str, cases: dict[str, list[Case]]) -> No
         for case in cases[name]:
             truth, light = reference(three(case)), replace(LIGHT, direction=case.view.sun)
             if case.size == max(SIZES):
-                buffers.vertices.write(vertex_data(case.drawn, buffers.origin).tobytes())
+                put(case.drawn, buffers)
                 found = score(truth, live(buffers, case.camera, light))
                 flip.setdefault(f"{case.size} px, as it is", []).append(found["flip"])
-            moved = on_grid(case.drawn, case.camera)
-            buffers.vertices.write(vertex_data(moved, buffers.origin).tobytes())
+            put(on_grid(case.drawn, case.camera), buffers)
             found = score(truth, live(buffers, case.camera, light))
             flip.setdefault(f"{case.size} px", []).append(found["flip"])
             bias.append(found["coverage_bias"])

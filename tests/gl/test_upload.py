@@ -17,7 +17,7 @@ VERTEX = """#version 330 core
 in vec4 in_position_u; in vec4 in_normal_v; in vec4 in_color;
 out vec2 uv; out vec4 tint;
 void main() {
-    gl_Position = vec4(in_position_u.xyz, 1.0);
+    gl_Position = vec4(in_position_u.xyz * sqrt(2.0), 1.0);  // radii of the square
     uv = vec2(in_position_u.w, in_normal_v.w);
     tint = in_color;
 }"""
@@ -65,8 +65,16 @@ def drawn(plant: Plant, size=16, **options) -> np.ndarray:
 def test_vertices_are_relative_to_the_plants_centre():
     """A map coordinate would leave float32 no millimetres."""
     plant = squares([Material("m")], offset=5_000_000.0)
-    data = vertex_data(plant, plant.center)
+    data = vertex_data(plant, plant.center, 1.0)
     assert np.abs(data[:, :2]).max() == pytest.approx(1.0)
+
+
+def test_a_plant_of_another_size_and_place_is_uploaded_with_the_same_roundings():
+    """Units are its own radius: to the last bit, but for the roundings of the moved input."""
+    plant = squares([Material("m"), Material("n")])
+    grown = replace(plant, positions=1e6 * plant.positions)
+    with PlantBuffers(plant) as here, PlantBuffers(grown) as there:
+        assert here.vertices.read() == there.vertices.read()
 
 
 def test_the_first_ring_under_alpha_0_takes_its_neighbours_colour():
@@ -137,7 +145,7 @@ def test_many_vertices_take_wider_rows_rather_than_too_many(monkeypatch):
         texture = buffers.vertex_texture
         assert texture.size == (9, 4)
         read = np.frombuffer(texture.read(), np.float32).reshape(12, 12)
-    np.testing.assert_array_equal(read, vertex_data(plant, plant.center))
+    np.testing.assert_array_equal(read, vertex_data(plant, plant.center, plant.radius))
 
 
 @pytest.mark.gl

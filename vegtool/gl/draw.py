@@ -123,9 +123,10 @@ def render(buffers: PlantBuffers, shot: Shot, light: Light, supersample: int = 1
 
 def placed(buffers: PlantBuffers, shot: Shot) -> tuple[float, ...]:
     """The uniform `view_projection` of camera.vert, for positions as they were uploaded."""
-    shift = np.eye(4)
-    shift[:3, 3] = buffers.origin - shot.target
-    return tuple((shot.view_projection @ shift).T.ravel())
+    place = np.diag([buffers.scale, buffers.scale, buffers.scale, 1.0])
+    place[:3, 3] = buffers.origin - shot.target
+    # any multiple of the matrix draws the same: without metres, roundings do not depend on size
+    return tuple((shot.view_projection @ place / buffers.scale).T.ravel())
 
 
 def render_group(buffers: PlantBuffers, group: MaterialGroup, shader: moderngl.Program) -> None:

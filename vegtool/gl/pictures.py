@@ -202,13 +202,13 @@ def _picture_table(buffers: PlantBuffers, pictures: Pictures) -> moderngl.Textur
     """Four texels per picture, as `picture.vert` reads them."""
     count = len(pictures.center)
     rows = max(1, -(-count // PICTURES_PER_ROW))
-    least = LEAST_HALF_SIZE * buffers.plant.radius
     data = np.zeros((rows * PICTURES_PER_ROW, 4, 4), dtype=np.float32)
     data[:count, 0, :3] = pictures.u
     data[:count, 1, :3] = pictures.v
-    data[:count, :2, 3] = np.maximum(pictures.half_size, least)
-    data[:count, 2, :3] = pictures.center - buffers.origin
-    data[:count, 2, 3] = np.where(pictures.half_depth > least, pictures.half_depth, 0)
+    data[:count, :2, 3] = np.maximum(pictures.half_size / buffers.scale, LEAST_HALF_SIZE)
+    data[:count, 2, :3] = (pictures.center - buffers.origin) / buffers.scale
+    half_depth = pictures.half_depth / buffers.scale
+    data[:count, 2, 3] = np.where(half_depth > LEAST_HALF_SIZE, half_depth, 0)
     data[:count, 3] = pictures.rect
     texture = buffers.ctx.texture((4 * PICTURES_PER_ROW, rows), 4, data, dtype="f4")
     texture.filter = (moderngl.NEAREST, moderngl.NEAREST)

@@ -50,8 +50,9 @@ class MaterialGroup:
 class PlantBuffers:
     """A plant's vertices, indices and textures on the GPU. A context manager: leaving releases.
 
-    origin: (3,) metres; what is uploaded is relative to it (float32), so a view or billboard
-    matrix has to be as well.
+    origin, scale: (3,) and metres: what is uploaded (float32) is relative to the origin, in units
+    of the scale, the plant's radius; so a matrix or a billboard has to be as well. A plant far from
+    the origin, or of another size, is drawn with the same roundings.
     face_order: (f,) the plant's faces in the order of the index buffer, material by material.
     groups: one per material that has faces.
     mipmaps: give textures mips, as a client does, and leave the colour under alpha 0 as it is.
@@ -63,6 +64,7 @@ class PlantBuffers:
         self.plant = plant
         self.ctx = ctx or context()
         self.origin: FloatArray = plant.center
+        self.scale: float = plant.radius or 1.0
         self.face_order = np.argsort(plant.face_material, kind="stable").astype(np.int32)
         self.mipmaps = mipmaps
         self._filter = (
@@ -102,12 +104,12 @@ class PlantBuffers:
     @cached_property
     def vertices(self) -> moderngl.Buffer:
         """Three vec4 per vertex: `in_position_u`, `in_normal_v`, `in_color`."""
-        return self._own(self.ctx.buffer(vertex_data(self.plant, self.origin).tobytes()))
+        return self._own(self.ctx.buffer(vertex_data(self.plant, self.origin, self.scale).tobytes()))
 
     @cached_property
     def vertex_texture(self) -> moderngl.Texture:
         """The same three vec4 per vertex as RGBA32F texels, whole vertices to a row."""
-        data = vertex_data(self.plant, self.origin)
+        data = vertex_data(self.plant, self.origin, self.scale)
         limit = describe(self.ctx).max_texture
         width = 3 * max(VERTICES_PER_ROW, -(-len(data) // limit))
         rows = max(1, -(-data.size // (4 * width)))
@@ -227,10 +229,11 @@ class PlantBuffers:
         return made
 
 
-def vertex_data(plant: Plant, origin: FloatArray) -> npt.NDArray[np.float32]:
-    """(v, 12) float32: position relative to origin, u, normal, v, linear colour factors."""
+def vertex_data(plant: Plant, origin: FloatArray, scale: float) -> npt.NDArray[np.float32]:
+    """(v, 12) float32: position relative to origin, in units of scale, u, normal, v, linear colour
+    factors."""
     data = np.empty((len(plant.positions), VERTEX_FLOATS), dtype=np.float32)
-    data[:, 0:3] = plant.positions - origin
+    data[:, 0:3] = (plant.positions - origin) / scale
     data[:, 3] = plant.uvs[:, 0]
     data[:, 4:7] = plant.normals
     data[:, 7] = plant.uvs[:, 1]
