@@ -34,7 +34,7 @@ from vegtool.clustering import cluster
 from vegtool.formats import read_plant
 from vegtool.gl.draw import Light
 from vegtool.growth import sample
-from vegtool.lod import Display, Level
+from vegtool.lod import Level
 from vegtool.measure.pictures import client_plant, live, over, truth
 from vegtool.measure.scores import scores, truths
 from vegtool.measure.views import Camera, direction, views
@@ -103,15 +103,7 @@ def level_of(buffers: PlantBuffers, method: str, planes: int, pixels: float) -> 
 
     labels, billboards = fit_budget(plant, clusters, planes)
     density = pixels / float(np.ptp(plant.bounds, axis=0).max())
-    baked = bake(buffers, labels, billboards, density)
-    return Level(
-        "billboards",
-        billboards=baked.billboards,
-        atlas=baked.atlas,
-        double_sided=baked.double_sided,
-        texels_per_metre=baked.texels_per_metre,
-        near_distance_m=Display().distance_m(density),
-    )
+    return bake(buffers, labels, billboards, density)
 
 
 def compared(name: str, part: str, plant: Plant) -> Iterator[dict[str, Any]]:

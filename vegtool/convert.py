@@ -8,7 +8,7 @@ per pixel at that size. From where it may be used is measured then (measure/chai
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from math import log
 from typing import TYPE_CHECKING, cast, get_args
 
@@ -186,12 +186,8 @@ def billboard_level(
         BakeOptions(max_texture=options.max_texture),
         lambda stage, fraction: progress(stage, 0.4 + 0.6 * fraction),
     )
-    return Level(
-        "billboards",
-        billboards=baked.billboards,
-        atlas=baked.atlas,
-        double_sided=baked.double_sided,
-        texels_per_metre=baked.texels_per_metre,
+    return replace(
+        baked,
         near_distance_m=near_m,
         geometric_error_m=error,
         seconds={**seconds, **baked.seconds},

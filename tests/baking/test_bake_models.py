@@ -26,7 +26,6 @@ def test_levels_fill_their_atlas_and_keep_the_rules(models, name):
             boards = make_billboards(plant, labels)
             baked = bake(buffers, labels, boards, height / plant.height)
             atlas = baked.atlas
-            assert baked.fill >= 0.75
             assert baked.double_sided  # leaves are double-sided, wood is closed
             assert baked.texels_per_metre == height / plant.height
             assert (atlas.normal[..., 2] >= 128).all()
@@ -38,6 +37,7 @@ def test_levels_fill_their_atlas_and_keep_the_rules(models, name):
                 shown_here = shown[y : y + h, x : x + w]
                 if shown_here.any():  # dilated: nothing black is left where something is shown
                     assert atlas.color[y : y + h, x : x + w, :3].any(axis=-1).all()
+            assert around.mean() >= 0.75
             assert (atlas.depth[shown & picture] > 0).all()
             assert (atlas.depth[~(shown & picture)] == 0).all()
             assert not (shown & ~around).any()  # gutters repeat the edge, the rest is empty

@@ -7,8 +7,6 @@ the alpha test (coverage.py).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
 from math import sqrt
 
 import numpy as np
@@ -23,7 +21,7 @@ from vegtool.errors import UsageError
 from vegtool.gl.context import describe
 from vegtool.gl.pictures import Drawn, draw_pictures
 from vegtool.gl.upload import PlantBuffers as PlantBuffers  # for those who bake several levels
-from vegtool.lod import Atlas, Billboards
+from vegtool.lod import Atlas, Billboards, Level
 from vegtool.plant import Plant
 from vegtool.progress import Progress, silent
 from vegtool.timing import timed
@@ -34,25 +32,6 @@ CHEAP_SAMPLES = 2_000_000
 """Samples of an atlas up to which more of them per texel cost little."""
 
 
-@dataclass(frozen=True, eq=False)
-class Baked:
-    """A level's textures.
-
-    billboards: the rectangles given; some turned round (u and the normal), so that the side which
-    shows more is in front. double_sided: as in Level.
-    texels_per_metre: the density used, lower than asked for where max_texture forbade it.
-    fill: share of the atlas taken by pictures and their gutters. seconds: by stage.
-    """
-
-    billboards: Billboards
-    atlas: Atlas
-    double_sided: bool
-    texels_per_metre: float
-    supersample: int
-    fill: float
-    seconds: Mapping[str, float] = field(default_factory=dict)
-
-
 def bake(
     plant: Plant | PlantBuffers,
     labels: IntArray,
@@ -60,12 +39,14 @@ def bake(
     texels_per_metre: float,
     options: BakeOptions | None = None,
     progress: Progress = silent,
-) -> Baked:
+) -> Level:
     """Bake the faces of each cluster into the pictures of the billboards that show it.
 
     plant: give PlantBuffers to bake several levels from one upload. labels: (f,) int32 cluster of
     each face, matching `billboards.cluster`; faces of clusters that no billboard shows are left
-    out. Raises UsageError where the pictures cannot fit into max_texture at any density, and
+    out. The level's billboards are those given, some turned round (u and the normal), so that the
+    side which shows more is in front; its density is lower than asked for where max_texture forbids
+    that. From where it may be used, and its errors, are for others to say. Raises UsageError where the pictures cannot fit into max_texture at any density, and
     CapabilityError where there is no OpenGL.
     """
     options = options or BakeOptions()
@@ -110,7 +91,14 @@ def bake(
         back[behind] = packing.rect[len(billboards) :]
         atlas = Atlas(*dilated(drawn, packing), drawn.depth, front, back)
     progress("bake", 1.0)
-    return Baked(billboards, atlas, double_sided, density, samples, packing.fill, seconds)
+    return Level(
+        "billboards",
+        billboards=billboards,
+        atlas=atlas,
+        double_sided=double_sided,
+        texels_per_metre=density,
+        seconds=seconds,
+    )
 
 
 def pairs(labels: IntArray, cluster: IntArray) -> tuple[IntArray, IntArray]:

@@ -37,12 +37,4 @@ def crossed(plant: Plant) -> Level:
         cluster=np.zeros(2, np.int32),
     )
     density = TEXELS / (2 * half.max())
-    baked = bake(plant, np.zeros(len(plant.faces), np.int32), billboards, density)
-    return Level(
-        "billboards",
-        billboards=baked.billboards,
-        atlas=baked.atlas,
-        double_sided=baked.double_sided,
-        texels_per_metre=baked.texels_per_metre,
-        seconds=dict(baked.seconds),
-    )
+    return bake(plant, np.zeros(len(plant.faces), np.int32), billboards, density)

@@ -8,10 +8,10 @@ from functools import cache, partial
 import numpy as np
 
 from vegtool.arrays import FloatArray, IntArray
-from vegtool.baking.bake import Baked, bake, pairs
+from vegtool.baking.bake import bake, pairs
 from vegtool.boxes import BoxOptions, make_billboards
 from vegtool.clustering import cluster
-from vegtool.lod import Billboards
+from vegtool.lod import Billboards, Level
 from vegtool.seeding import generator
 from vegtool.stability.case import Case, Outcome, drawn, exact, holds, relative
 from vegtool.stability.clustering import DEGENERATE
@@ -23,8 +23,9 @@ NONE = np.zeros(1, dtype=np.int32)
 """The cluster of a lone billboard."""
 
 
-def covered_area(baked: Baked) -> float:
+def covered_area(baked: Level) -> float:
     """Square metres: what the pictures cover."""
+    assert baked.billboards is not None and baked.atlas is not None
     alpha = baked.atlas.color[..., 3] / 255
     shares = [alpha[y : y + h, x : x + w].mean() for x, y, w, h in baked.atlas.front.tolist()]
     return float(4 * baked.billboards.half_size.prod(axis=1) @ np.array(shares))
@@ -112,13 +113,14 @@ def always_some(made: Callable[[], FloatArray]) -> Outcome:
     labels = np.zeros(len(plant.faces), dtype=np.int32)
     billboards = make_billboards(plant, labels)
     density = 32 / (plant.radius or 1.0)
-    one, two = (bake(plant, labels, billboards, density) for _ in range(2))
+    one, two = (bake(plant, labels, billboards, density).atlas for _ in range(2))
+    assert one is not None and two is not None
     wrong = [
-        not np.array_equal(one.atlas.color, two.atlas.color),
-        not np.array_equal(one.atlas.depth, two.atlas.depth),
-        bool((one.atlas.front[:, 2:] < 1).any()),
+        not np.array_equal(one.color, two.color),
+        not np.array_equal(one.depth, two.depth),
+        bool((one.front[:, 2:] < 1).any()),
     ]
-    note = f"atlas {one.atlas.color.shape[1]} x {one.atlas.color.shape[0]}"
+    note = f"atlas {one.color.shape[1]} x {one.color.shape[0]}"
     return holds(sum(wrong), "pictures with texels, twice the same", note=note)
 
 
