@@ -104,7 +104,9 @@ class PlantBuffers:
     @cached_property
     def vertices(self) -> moderngl.Buffer:
         """Three vec4 per vertex: `in_position_u`, `in_normal_v`, `in_color`."""
-        return self._own(self.ctx.buffer(vertex_data(self.plant, self.origin, self.scale).tobytes()))
+        return self._own(
+            self.ctx.buffer(vertex_data(self.plant, self.origin, self.scale).tobytes())
+        )
 
     @cached_property
     def vertex_texture(self) -> moderngl.Texture:

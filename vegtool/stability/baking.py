@@ -13,7 +13,15 @@ from vegtool.boxes import BoxOptions, make_billboards
 from vegtool.clustering import cluster
 from vegtool.lod import Billboards, Level
 from vegtool.seeding import generator
-from vegtool.stability.case import Case, Outcome, drawn, exact, holds, relative
+from vegtool.stability.case import (
+    Case,
+    Outcome,
+    drawn,
+    exact,
+    holds,
+    relative,
+    same_objective,
+)
 from vegtool.stability.clustering import DEGENERATE
 from vegtool.stability.plants import MOTIONS, TRIANGLE, Motion, at, rotated, soup, tree
 
@@ -61,7 +69,8 @@ def motion_changes_nothing(motion: Motion) -> Outcome:
     density = TEXELS / tree().height / motion.scale
     baked = bake(motion.plant(tree()), labels, moved(billboards, motion), density)
     there = covered_area(baked) / motion.scale**2
-    return drawn(relative(there, here), note=f"{len(billboards)} pictures")
+    same = drawn if motion.turns else same_objective
+    return same(relative(there, here), note=f"{len(billboards)} pictures")
 
 
 def half_a_picture(motion: Motion) -> Outcome:

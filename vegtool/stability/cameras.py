@@ -20,7 +20,15 @@ from vegtool.measure.pictures import TRUTH_SUPERSAMPLE, live, truth
 from vegtool.measure.views import Camera, around, direction
 from vegtool.plant import Material
 from vegtool.seeding import generator
-from vegtool.stability.case import Case, Outcome, drawn, exact, holds, relative
+from vegtool.stability.case import (
+    Case,
+    Outcome,
+    drawn,
+    exact,
+    holds,
+    relative,
+    same_objective,
+)
 from vegtool.stability.plants import FAR, Motion, box_faces, rotated, soup, tree
 
 SIDE = 64
@@ -199,7 +207,8 @@ def moved_picture(motion: Motion) -> Outcome:
     with PlantBuffers(motion.plant(tree())) as buffers:
         there = truth(buffers, moved_camera(motion)).astype(np.float64)
     error = relative(float(there[..., 3].sum()), float(here[..., 3].sum()))
-    return drawn(error, note=f"{float(np.abs(there - here)[..., 3].mean()):.1e} on average a pixel")
+    note = f"{float(np.abs(there - here)[..., 3].mean()):.1e} on average a pixel"
+    return drawn(error, note=note) if motion.turns else same_objective(error, note=note)
 
 
 def fields_of_view(fov: float) -> Outcome:

@@ -29,6 +29,11 @@ class Motion:
     scale: float = 1.0
     offset: float = 0.0
 
+    @property
+    def turns(self) -> bool:
+        """Whether it turns the plant."""
+        return not np.array_equal(self.turn, np.eye(3))
+
     def plant(self, plant: Plant) -> Plant:
         """The plant moved; its normals turn along."""
         positions, normals = self.of(plant.positions), rotated(plant.normals, self.turn)
