@@ -24,10 +24,10 @@ more is known of a coordinate there.
   that spread alike along two axes, are turned further, onto exact rectangles.
 - Texels and distances go by the longest extent along an axis, so a turned plant is sampled more or
   less finely, and its coverage differs by what sampling differs.
-- The GPU holds positions in single precision about the plant's middle, in units of its radius. Moved
-  and scaled plants are drawn alike to the bit; a turned one rounds elsewhere, and a sample on an
-  edge may fall to its other side; and what is 1e4 times smaller than the plant is drawn to about a
-  thousandth of its own size.
+- The GPU holds positions in single precision about the plant's middle, in units of its radius.
+  Moved and scaled plants are drawn alike to the bit. A turned one rounds elsewhere, so a sample on
+  an edge may fall to its other side; and what is 1e4 times smaller than the plant is drawn to about
+  a thousandth of its own size.
 - A camera's near plane is at least a thousandth as far as its far plane; what is nearer is cut off.
 """
 COLUMNS = ("case", "oracle", "error", "at most", "because", "rounds", "seconds", "note")
