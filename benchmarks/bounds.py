@@ -120,10 +120,9 @@ def measured_level(plant: Plant, labels: IntArray, billboards: Billboards) -> Le
     points, shown_by = tested(plant, labels, billboards)
     starts = np.searchsorted(shown_by, np.arange(len(billboards)))
     display = Display()
-    extent = float(np.ptp(plant.bounds, axis=0).max())
     rows = [], [], [], []
     for pixels in LADDER:
-        distance = display.distance_m(pixels / extent)
+        distance = display.distance_m(pixels / plant.extent)
         for view in views("all", VIEWS):
             camera = around(plant.positions, view.direction, distance, display)
             found = displacement(points, shown_by, billboards, camera)

@@ -48,7 +48,6 @@ OTHERS = tuple(
 def rows_of(plant: Plant) -> Iterator[dict[str, Any]]:
     """A row per level and limit; one with empty figures where no level keeps to the limit."""
     display = Display()
-    extent = float(np.ptp(plant.bounds, axis=0).max())
     made = convert(plant, ConvertOptions(), MeasureOptions(measure="off")).levels[1:]
     for limit in LIMITS:
         row = {"version": __version__, "plant": plant.name, "limit": limit}
@@ -67,7 +66,7 @@ def rows_of(plant: Plant) -> Iterator[dict[str, Any]]:
             for start in (level.near_distance_m, 2 * level.near_distance_m):
                 if start > end:
                     continue
-                pixels = extent * display.pixels_per_metre(start)
+                pixels = plant.extent * display.pixels_per_metre(start)
                 truth = truths(plant, OTHERS, [pixels], display)
                 other = float(scores(truth, level).values["flip"].mean())
                 here = start == level.near_distance_m

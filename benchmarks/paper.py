@@ -102,7 +102,7 @@ def level_of(buffers: PlantBuffers, method: str, planes: int, pixels: float) -> 
         return cluster(plant, method, count)
 
     labels, billboards = fit_budget(plant, clusters, planes)
-    density = pixels / float(np.ptp(plant.bounds, axis=0).max())
+    density = pixels / plant.extent
     return bake(buffers, labels, billboards, density)
 
 

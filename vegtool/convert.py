@@ -16,9 +16,9 @@ from vegtool.arrays import IntArray
 from vegtool.baking.options import BakeOptions
 from vegtool.boxes.options import BoxOptions, Shape
 from vegtool.clustering import METHODS, ClusterOptions
-from vegtool.errors import UsageError
 from vegtool.lod import Display, Level, LodChain
 from vegtool.measure.options import MeasureOptions
+from vegtool.measure.views import distance_of
 from vegtool.options import check_limits, option
 from vegtool.plant import Plant
 from vegtool.progress import Progress, silent
@@ -209,16 +209,3 @@ def near_pixels(count: int) -> float:
     pixels, billboards = NEAR_PIXELS
     size = float(pixels * (count / billboards) ** (log(2) / log(LEVEL_RATIO)))
     return min(max(size, NEAR_LIMITS[0]), NEAR_LIMITS[1])
-
-
-def distance_of(plant: Plant, display: Display, pixels: float) -> float:
-    """Metres from which the plant's longest side covers that many pixels.
-
-    Raises UsageError for a plant without extent.
-    """
-    size = float((plant.bounds[1] - plant.bounds[0]).max())
-    if size <= 0:
-        raise UsageError(
-            f"{plant.source or plant.name}: expected a plant with an extent, found none"
-        )
-    return display.distance_m(pixels / size)

@@ -197,6 +197,11 @@ class Plant:
         return float(self.bounds[1, 1] - self.bounds[0, 1])
 
     @property
+    def extent(self) -> float:
+        """Metres: the longest side of the bounds, which of a tree is its height."""
+        return float((self.bounds[1] - self.bounds[0]).max())
+
+    @property
     def radius(self) -> float:
         """Metres: half the diagonal of the bounds; the plant lies within this of its center."""
         return float(0.5 * np.linalg.norm(self.bounds[1] - self.bounds[0]))

@@ -46,8 +46,9 @@ def bake(
     each face, matching `billboards.cluster`; faces of clusters that no billboard shows are left
     out. The level's billboards are those given, some turned round (u and the normal), so that the
     side which shows more is in front; its density is lower than asked for where max_texture forbids
-    that. From where it may be used, and its errors, are for others to say. Raises UsageError where the pictures cannot fit into max_texture at any density, and
-    CapabilityError where there is no OpenGL.
+    that. From where it may be used, and its errors, are for others to say. Raises UsageError where
+    the pictures cannot fit into max_texture at any density, and CapabilityError where there is no
+    OpenGL.
     """
     options = options or BakeOptions()
     if isinstance(plant, Plant):

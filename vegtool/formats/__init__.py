@@ -124,7 +124,7 @@ def _read(path: Path, options: ReadOptions) -> Plant:
     from vegtool.formats.read import assemble  # numpy and Pillow load only when a file is read
 
     plant = assemble(import_module(READERS[extension]).parse(path), path, options)
-    size = float((plant.bounds[1] - plant.bounds[0]).max())
+    size = plant.extent
     if not SMALLEST <= size <= LARGEST:
         raise InputError(
             f"{path}: expected a plant of {SMALLEST:g} to {LARGEST:g} metres, found one of "

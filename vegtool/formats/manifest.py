@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
 from importlib import resources
-from math import radians, tan
 from pathlib import Path
 from typing import Any
 
@@ -113,16 +112,17 @@ def _spreads(errors: dict[str, Spread]) -> dict[str, dict[str, float]]:
 
 
 def extent(chain: LodChain) -> float:
-    """Metres: the plant's largest extent along an axis, which for a tree is its height."""
+    """Metres: the original's."""
     original = chain.levels[0].mesh
     if original is None:
         raise ValueError("LodChain: level 0 must be a mesh")
-    return float((original.bounds[1] - original.bounds[0]).max())
+    return original.extent
 
 
 def screen_height_fraction(chain: LodChain, distance_m: float) -> float:
     """Share of the image's height that the plant's largest extent covers from that distance."""
-    return extent(chain) / (2 * tan(radians(chain.display.fov_y_deg) / 2) * distance_m)
+    display = chain.display
+    return extent(chain) * display.pixels_per_metre(distance_m) / display.image_height_px
 
 
 def encode(values: dict[str, Any]) -> bytes:

@@ -87,9 +87,10 @@ def assemble(parsed: Parsed, path: Path, options: ReadOptions) -> Plant:
 
 
 def _note_size(plant: Plant, notes: list[str]) -> None:
-    size = float(np.ptp(plant.bounds, axis=0).max())
-    if not LEAST_SIZE <= size <= GREATEST_SIZE:
-        notes.append(f"{size:,.4g} metres across: is that so? --unit says what the file counts in")
+    if not LEAST_SIZE <= plant.extent <= GREATEST_SIZE:
+        notes.append(
+            f"{plant.extent:,.4g} metres across: is that so? --unit says what the file counts in"
+        )
 
 
 def _join(parts: list[Part], path: Path) -> _Mesh:

@@ -99,7 +99,6 @@ class _Bench:
     ) -> None:
         self.plant, self.levels, self.options, self.display = plant, levels, options, display
         self.views = views(options.views, FULL_VIEWS if options.measure == "full" else QUICK_VIEWS)
-        self.extent = float((plant.bounds[1] - plant.bounds[0]).max())
         meshes = [plant, *(client_plant(level) for level in levels)]
         self._sharp = stack.enter_context(PlantBuffers(plant))
         self._drawn = [stack.enter_context(PlantBuffers(mesh, mipmaps=True)) for mesh in meshes]
@@ -122,7 +121,7 @@ class _Bench:
 
     def pixels(self, distance_m: float) -> float:
         """Size of the plant on the screen from that distance."""
-        return self.extent * self.display.pixels_per_metre(distance_m)
+        return self.plant.extent * self.display.pixels_per_metre(distance_m)
 
     def scores(self, distance_m: float, which: Sequence[int]) -> list[Scores]:
         """Of some of what is measured, at one distance."""

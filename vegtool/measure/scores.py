@@ -23,7 +23,7 @@ from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Display, Level, Spread
 from vegtool.measure.metrics import METRICS, Reference, reference, score
 from vegtool.measure.pictures import client_plant, live, truth
-from vegtool.measure.views import CLOSEST, Camera, View, around
+from vegtool.measure.views import CLOSEST, Camera, View, around, distance_of
 from vegtool.plant import Plant
 from vegtool.progress import Progress, silent
 
@@ -111,12 +111,10 @@ def outside(
     plant: Plant, pixels: Sequence[float], display: Display
 ) -> tuple[FloatArray, FloatArray]:
     """Those sizes on the screen, descending, at which the eye is outside the plant; and the
-    distances, metres, that give them. Raises UsageError where there are none."""
-    extent = float((plant.bounds[1] - plant.bounds[0]).max())
-    if not extent > 0:
-        raise UsageError(f"{plant.source or plant.name}: expected a plant with an extent")
+    distances, metres, that give them. Raises UsageError where there are none, and for a plant
+    without extent."""
     sizes = np.array(sorted(set(pixels), reverse=True), dtype=np.float64)
-    distances = np.array([display.distance_m(size / extent) for size in sizes])
+    distances = np.array([distance_of(plant, display, size) for size in sizes])
     seen = distances > CLOSEST * plant.radius
     if not seen.any():
         raise UsageError(

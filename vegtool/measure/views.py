@@ -14,6 +14,7 @@ import numpy as np
 from vegtool.arrays import FloatArray
 from vegtool.errors import UsageError
 from vegtool.lod import Display
+from vegtool.plant import Plant
 
 ELEVATIONS = {"ground": (-15.0, 30.0), "aerial": (15.0, 90.0), "all": (-90.0, 90.0)}
 """Degrees above the horizon, from the plant to the eye: a walker among plants of all sizes, a
@@ -156,6 +157,18 @@ def views(kind: str, count: int, phase: float = 0.0) -> tuple[View, ...]:
     rise = low + (high - low) * (((i + 1) / _PLASTIC**2 + phase) % 1)
     suns = _unit(rise, (i + 1) / _PLASTIC + 2 * phase)
     return tuple(View(d, s) for d, s in zip(directions, suns, strict=True))
+
+
+def distance_of(plant: Plant, display: Display, pixels: float) -> float:
+    """Metres from which the plant's longest side covers that many pixels.
+
+    Raises UsageError for a plant without extent.
+    """
+    if not plant.extent > 0:
+        raise UsageError(
+            f"{plant.source or plant.name}: expected a plant with an extent, found none"
+        )
+    return display.distance_m(pixels / plant.extent)
 
 
 def direction(azimuth_deg: float, elevation_deg: float) -> FloatArray:

@@ -11,13 +11,12 @@ from vegtool.convert import (
     TRIANGLES_PER_BILLBOARD,
     ConvertOptions,
     billboard_level,
-    distance_of,
     near_pixels,
 )
 from vegtool.errors import CapabilityError
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Level
-from vegtool.measure.views import View
+from vegtool.measure.views import View, distance_of
 from vegtool.progress import Progress
 from vegtool.report.options import ReportOptions
 from vegtool.report.rows import LIVE

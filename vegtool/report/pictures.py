@@ -12,14 +12,13 @@ import numpy as np
 from matplotlib import colormaps
 from PIL import Image
 
-from vegtool.convert import distance_of
 from vegtool.gl.draw import Light
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Display, Level
 from vegtool.measure.flip import Float32s, difference, perceived
 from vegtool.measure.metrics import BACKGROUND, Picture
 from vegtool.measure.pictures import client_plant, live, over, truth
-from vegtool.measure.views import CLOSEST, Camera, View, around, direction
+from vegtool.measure.views import CLOSEST, Camera, View, around, direction, distance_of
 from vegtool.report.entries import Entry, Shown
 from vegtool.report.rows import Pictures
 
@@ -27,7 +26,6 @@ SIZES = (200, 75)
 """Pixels, the plant's longest extent."""
 VIEW = View(direction(25.0, 8.0), direction(65.0, 40.0))
 """A walker's, with the sun behind his shoulder."""
-SAMPLES = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,9 +47,7 @@ def scene(buffers: PlantBuffers, display: Display) -> Scene:
         if distance > CLOSEST * plant.radius
     }
     light = Light(direction=VIEW.sun)
-    return Scene(
-        cameras, {s: truth(buffers, camera, light, SAMPLES) for s, camera in cameras.items()}
-    )
+    return Scene(cameras, {s: truth(buffers, camera, light) for s, camera in cameras.items()})
 
 
 def sizes_of(entry: Entry, among: Sequence[Entry]) -> list[int]:

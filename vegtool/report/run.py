@@ -138,7 +138,7 @@ def _plant(
         name,
         str(source),
         len(plant.faces),
-        float((plant.bounds[1] - plant.bounds[0]).max()),
+        plant.extent,
         (*plant.notes, *missing),
         tuple(replace(row, plant=name) for row in _with_distances(rows, options)),
         {k: _decoded(v["pictures"]) for k, v in finished.items() if v.get("pictures")},
