@@ -7,15 +7,17 @@ import json
 import re
 from collections.abc import Iterator
 from dataclasses import replace
+from html import escape
 from html.parser import HTMLParser
 from io import StringIO
+from pathlib import Path
 
 import pytest
 from report_cases import PIXELS, plant_report, report
 
 from vegtool.report.page import page
 from vegtool.report.plots import COSTS
-from vegtool.report.write import csv_text, encoded
+from vegtool.report.write import csv_text, encoded, write
 
 VOID = {"meta", "img", "br", "link"}
 
@@ -78,6 +80,22 @@ def test_what_users_name_is_escaped(text: str) -> None:
     assert "a note &lt;of&gt; it" in text
     assert "x &lt; y" in text
     assert "llvmpipe &amp; co" in text
+
+
+@pytest.mark.parametrize(
+    "name", ["a$\\frac$b", "木", "bad\udcff", '"><script>x</script>', "n" * 240, "]]>-->"]
+)
+def test_a_plant_may_have_any_name_that_a_file_may(name: str, tmp_path: Path) -> None:
+    """No formula, no letter that a font lacks, no markup, no bytes that are no Unicode."""
+    made = report(plant_report(name))
+    shown = escape(name).encode(errors="backslashreplace").decode()
+    write(made, tmp_path, False, ())
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    checker = Checker()
+    checker.feed(text)
+    assert not checker.open
+    assert f"<h2>{shown}</h2>" in text
+    assert text.count("<script>") == 1
 
 
 def test_each_plant_and_row_is_there_and_cells_that_beat_live_are_marked(text: str) -> None:

@@ -115,16 +115,13 @@ def _plots(found: Sequence[Point], of: str) -> str:
         "texture_bytes": "Error against bytes of textures",
         "frame_ms": "Error against frame time",
     }
-    figures = []
-    for cost in COSTS:
-        title = titles[cost.name]
-        drawn = error_against(found, cost, f"{title}: {of}")
-        figures.append(
-            f'<figure class="plot">{svg(drawn, escape(f"{title}: {of}", quote=True))}</figure>'
-        )
-    title = f"Error against distance: {of}"
-    far = svg(error_against_distance(found, title), escape(title, quote=True))
-    return "".join(figures) + f'<figure class="plot">{far}</figure>'
+    drawn = [(titles[cost.name], error_against(found, cost, titles[cost.name])) for cost in COSTS]
+    far = "Error against distance"
+    drawn.append((far, error_against_distance(found, far)))
+    return "".join(  # plants are named outside: a plot cannot show every name
+        f'<figure class="plot">{svg(figure, escape(f"{title}: {of}", quote=True))}</figure>'
+        for title, figure in drawn
+    )
 
 
 def _closest(found: Sequence[Point]) -> str:

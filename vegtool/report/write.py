@@ -38,7 +38,7 @@ def write(report: Report, folder: Path, force: bool, inputs: Iterable[Path]) -> 
     contents = (json.dumps(encoded(report)), csv_text(report), page(report))
     with FileSet(folder, force, inputs) as files:
         for name, text in zip(FILES, contents, strict=True):
-            files.add(name, text.encode())
+            files.add(name, text.encode(errors="backslashreplace"))  # names that are no Unicode
         return files.paths
 
 
