@@ -35,7 +35,8 @@ from vegtool.formats import read_plant
 from vegtool.gl.draw import Light
 from vegtool.growth import sample
 from vegtool.lod import Level
-from vegtool.measure.pictures import client_plant, live, over, truth
+from vegtool.measure.background import bytes_over
+from vegtool.measure.pictures import client_plant, live, truth
 from vegtool.measure.scores import scores, truths
 from vegtool.measure.views import Camera, direction, views
 from vegtool.plant import Branches, Plant
@@ -203,7 +204,7 @@ def figure() -> None:
     sheet = Image.new("RGB", (CELL * len(shown), CELL + 34), (250, 250, 248))
     pen, font = ImageDraw.Draw(sheet), ImageFont.load_default(16)
     for column, (name, picture) in enumerate(shown.items()):
-        sheet.paste(Image.fromarray(over(picture, SKY)), (column * CELL, 0))
+        sheet.paste(Image.fromarray(bytes_over(picture, SKY)), (column * CELL, 0))
         pen.text((column * CELL + 10, CELL + 8), name, fill=(30, 34, 38), font=font)
     sheet.save(FIGURE, quality=90)
 

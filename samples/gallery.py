@@ -13,7 +13,8 @@ from PIL import Image
 from vegtool.gl.draw import Light
 from vegtool.gl.upload import PlantBuffers
 from vegtool.growth import SAMPLES, sample
-from vegtool.measure.pictures import over, truth
+from vegtool.measure.background import bytes_over
+from vegtool.measure.pictures import truth
 from vegtool.measure.views import Camera, direction
 from vegtool.plant import Plant
 
@@ -35,7 +36,7 @@ def portrait(plant: Plant) -> np.ndarray:
     middle = (CELL / 2, CELL / 2)
     camera = Camera(plant.center, towards, distance, focal, CELL, CELL, middle, 1.5 * plant.radius)
     with PlantBuffers(plant) as buffers:
-        return over(truth(buffers, camera, SUN), SKY)
+        return bytes_over(truth(buffers, camera, SUN), SKY)
 
 
 def main() -> None:

@@ -14,6 +14,9 @@ import numpy.typing as npt
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int32]
 ByteArray = npt.NDArray[np.uint8]
+SingleArray = npt.NDArray[np.float32]
+Picture = SingleArray
+"""(height, width, 4): linear light premultiplied by coverage, and coverage."""
 
 
 def checked(

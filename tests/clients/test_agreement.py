@@ -20,10 +20,11 @@ import numpy as np
 import pytest
 from programs import MARKS, MODELS, node
 
+from vegtool.arrays import Picture
 from vegtool.convert import ConvertOptions, convert
 from vegtool.formats import read_plant
 from vegtool.formats.gltf import level_glb, plant_glb
-from vegtool.gl.draw import Light, Picture
+from vegtool.gl.draw import Light
 from vegtool.gl.upload import PlantBuffers, vertex_data
 from vegtool.growth import sample
 from vegtool.lod import Display

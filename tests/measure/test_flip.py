@@ -10,14 +10,13 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from vegtool.arrays import FloatArray
+from vegtool.arrays import FloatArray, SingleArray
 from vegtool.formats import read_plant
-from vegtool.gl.draw import Picture
 from vegtool.gl.upload import PlantBuffers
 from vegtool.growth import sample
 from vegtool.lod import Display
-from vegtool.measure.flip import BLOCK, STRIP, Float32s, difference, perceived
-from vegtool.measure.metrics import BACKGROUND
+from vegtool.measure.background import over
+from vegtool.measure.flip import BLOCK, STRIP, difference, perceived
 from vegtool.measure.pictures import live, truth
 from vegtool.measure.views import around, direction
 from vegtool.plant import Plant
@@ -29,17 +28,17 @@ NEAR_NOTHING = 1e-4
 """Where pictures differ by nothing but rounding, whose powers of 0.7 and 0.5 FLIP takes."""
 
 
-def flip(reference: Float32s, test: Float32s) -> Float32s:
+def flip(reference: SingleArray, test: SingleArray) -> SingleArray:
     return difference(perceived(reference), perceived(test))
 
 
-def oracle(reference: Float32s, test: Float32s) -> FloatArray:
+def oracle(reference: SingleArray, test: SingleArray) -> FloatArray:
     pair = (np.ascontiguousarray(p) for p in (reference, test))
     found, *_ = flip_evaluator.evaluate(*pair, "LDR", inputsRGB=False, applyMagma=False)
     return np.asarray(found, np.float64).reshape(reference.shape[:2])
 
 
-def pictures(kind: str, height: int, width: int) -> tuple[Float32s, Float32s]:
+def pictures(kind: str, height: int, width: int) -> tuple[SingleArray, SingleArray]:
     """Two linear pictures, (height, width, 3)."""
     random = generator(1, kind, height, width)
     a, b = random.random((2, height, width, 3), np.float32)
@@ -70,17 +69,11 @@ def test_agrees_on_pictures_smaller_than_any_filter(size: tuple[int, int]) -> No
     np.testing.assert_allclose(flip(a, b), oracle(a, b), rtol=0, atol=NEAR_NOTHING)
 
 
-def rendered(plant: Plant, pixels: float) -> tuple[Float32s, Float32s]:
+def rendered(plant: Plant, pixels: float) -> tuple[SingleArray, SingleArray]:
     """Truth and live picture of a plant so many pixels high, over the background, linear."""
-    extent = float((plant.bounds[1] - plant.bounds[0]).max())
     display = Display()
-    distance = display.distance_m(pixels / extent)
+    distance = display.distance_m(pixels / plant.extent)
     camera = around(plant.positions, direction(30.0, 10.0), distance, display)
-
-    def over(picture: Picture) -> Float32s:
-        linear = picture[..., :3] + (1 - picture[..., 3:]) * BACKGROUND
-        return np.clip(linear, 0, 1)
-
     with PlantBuffers(plant) as exact, PlantBuffers(plant, mipmaps=True) as mipmapped:
         return over(truth(exact, camera)), over(live(mipmapped, camera))
 

@@ -16,14 +16,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from skimage.metrics import peak_signal_noise_ratio, structural_similarity
 
+from vegtool.arrays import Picture
+from vegtool.measure.background import BACKGROUND
 from vegtool.measure.metrics import (
-    BACKGROUND,
     DARKEST,
     METRICS,
     PSNR_CAP,
     SAMPLE,
     SSIM_WINDOW,
-    Picture,
     reference,
     score,
 )

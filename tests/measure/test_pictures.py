@@ -13,9 +13,10 @@ from vegtool.convert import ConvertOptions, convert
 from vegtool.gl.draw import Light
 from vegtool.gl.upload import PlantBuffers
 from vegtool.growth import sample
+from vegtool.measure.background import bytes_over
 from vegtool.measure.contact_sheet import contact_sheet
 from vegtool.measure.options import MeasureOptions
-from vegtool.measure.pictures import fragments, frame_seconds, live, over, truth
+from vegtool.measure.pictures import fragments, frame_seconds, live, truth
 from vegtool.measure.views import Camera, direction
 from vegtool.plant import Material, Plant, Texture
 
@@ -94,7 +95,7 @@ def test_far_from_the_origin_the_picture_is_the_same() -> None:
 
 def test_half_the_light_over_white_is_not_half_the_grey() -> None:
     half = np.array([[[0.0, 0, 0, 0.5]]], np.float32)
-    assert over(half, (1, 1, 1))[0, 0, 0] == 188, "linear 0.5 is sRGB 188"
+    assert bytes_over(half, (1, 1, 1))[0, 0, 0] == 188, "linear 0.5 is sRGB 188"
 
 
 def test_contact_sheet_is_the_one_that_was_looked_at() -> None:

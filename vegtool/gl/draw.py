@@ -9,16 +9,13 @@ from weakref import WeakKeyDictionary
 
 import moderngl
 import numpy as np
-import numpy.typing as npt
 
-from vegtool.arrays import FloatArray
+from vegtool.arrays import FloatArray, Picture
 from vegtool.gl.context import check, framebuffer_kept
 from vegtool.gl.program import program
 from vegtool.gl.targets import Target, drawing_target, pixel_target, side
 from vegtool.gl.upload import MaterialGroup, PlantBuffers
 
-Picture = npt.NDArray[np.float32]
-"""(height, width, 4): linear light premultiplied by coverage, and coverage."""
 MSAA = 4
 """Samples per pixel of a live picture, as engines do by default."""
 

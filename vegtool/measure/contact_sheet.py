@@ -11,18 +11,16 @@ from io import BytesIO
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from vegtool.arrays import ByteArray
-from vegtool.gl.draw import Picture
+from vegtool.arrays import ByteArray, Picture
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Level, LodChain
-from vegtool.measure.pictures import client_plant, live, over, truth
+from vegtool.measure.background import bytes_over
+from vegtool.measure.pictures import client_plant, live, truth
 from vegtool.measure.views import direction, framed
 
 CELL = 360
 """Pixels of a picture's side on the sheet; small pictures are magnified to fill it."""
 MARGIN, LINE = 12, 18
-BACKGROUND = (0.19, 0.27, 0.36)
-"""Linear: a light overcast sky, against which both light and dark leaves stand out."""
 PAPER, INK, FAINT = (250, 250, 248), (30, 34, 38), (110, 116, 122)
 VIEW = direction(25.0, 8.0)
 
@@ -51,7 +49,7 @@ def contact_sheet(chain: LodChain) -> bytes:
     for column, (caption, pictures) in enumerate(zip(captions, cells, strict=True)):
         x, y = MARGIN + column * (CELL + MARGIN), MARGIN + 34
         for picture in pictures:
-            sheet.paste(Image.fromarray(_magnified(over(picture, BACKGROUND))), (x, y))
+            sheet.paste(Image.fromarray(_magnified(bytes_over(picture))), (x, y))
             y += CELL + MARGIN
         for row, (text, colour) in enumerate(caption):
             pen.text((x, y + LINE * row), text, fill=colour, font=small)

@@ -19,12 +19,9 @@ from dataclasses import dataclass
 from math import ceil, hypot, pi, sqrt
 
 import numpy as np
-import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
-from vegtool.arrays import FloatArray
-
-Float32s = npt.NDArray[np.float32]
+from vegtool.arrays import FloatArray, SingleArray
 
 PIXELS_PER_DEGREE = 0.7 * (3840 / 0.7) * pi / 180
 """Of visual angle: 0.7 m away from 3840 pixels on 0.7 m, the paper's and flip-evaluator's."""
@@ -61,12 +58,12 @@ class Perceived:
     edges, points: (h, w) strength of first and second derivatives of its lightness.
     """
 
-    color: Float32s
-    edges: Float32s
-    points: Float32s
+    color: SingleArray
+    edges: SingleArray
+    points: SingleArray
 
 
-def perceived(picture: Float32s) -> Perceived:
+def perceived(picture: SingleArray) -> Perceived:
     """A picture as FLIP sees it. picture: (h, w, 3) float32, linear sRGB, 0 to 1, opaque."""
     height, width = picture.shape[:2]
     y, cx, cz = _padded(picture @ OPPONENT.T.astype(np.float32))
@@ -77,7 +74,7 @@ def perceived(picture: Float32s) -> Perceived:
     )
 
 
-def difference(reference: Perceived, test: Perceived) -> Float32s:
+def difference(reference: Perceived, test: Perceived) -> SingleArray:
     """(h, w) float32 errors, 0 to 1, of two pictures of the same size."""
     error = np.empty_like(reference.edges)
     for first in range(0, len(error), STRIP):
@@ -91,7 +88,7 @@ def difference(reference: Perceived, test: Perceived) -> Float32s:
     return error
 
 
-def _contrast_filtered(y: Float32s, cx: Float32s, cz: Float32s) -> Float32s:
+def _contrast_filtered(y: SingleArray, cx: SingleArray, cz: SingleArray) -> SingleArray:
     """(3, H, W): opponent colours blurred as the eye does at this distance."""
     yellow_blue = [_across(_down(cz, band), band) for band in YELLOW_BLUE]
     return np.stack(
@@ -103,7 +100,7 @@ def _contrast_filtered(y: Float32s, cx: Float32s, cz: Float32s) -> Float32s:
     )
 
 
-def _features(y: Float32s) -> tuple[Float32s, Float32s]:
+def _features(y: SingleArray) -> tuple[SingleArray, SingleArray]:
     """Edges and points, (H, W) each."""
     blur, slope, bend = FEATURES
     blurred = _down(y, blur)
@@ -111,7 +108,7 @@ def _features(y: Float32s) -> tuple[Float32s, Float32s]:
     return edges, _length(_across(blurred, bend), _across(_down(y, bend), blur))
 
 
-def _color_difference(reference: Float32s, test: Float32s) -> Float32s:
+def _color_difference(reference: SingleArray, test: SingleArray) -> SingleArray:
     """HyAB distance of colours (3, h, w), compressed and mapped to 0 to 1."""
     lightness, a, b = np.abs(reference - test)
     distance = (lightness + _length(a, b)) ** np.float32(Q_COLOR)
@@ -122,11 +119,11 @@ def _color_difference(reference: Float32s, test: Float32s) -> Float32s:
     return np.asarray(np.minimum(first, second))
 
 
-def _length(a: Float32s, b: Float32s) -> Float32s:
+def _length(a: SingleArray, b: SingleArray) -> SingleArray:
     return np.asarray(np.sqrt(a * a + b * b))
 
 
-def _hunt_lab(opponent: Float32s) -> Float32s:
+def _hunt_lab(opponent: SingleArray) -> SingleArray:
     """L*a*b* (3, h, w), chroma times L* / 100, of filtered opponent colours (3, h, w)."""
     color = np.empty_like(opponent)
     for first in range(0, opponent.shape[1], STRIP):
@@ -138,13 +135,13 @@ def _hunt_lab(opponent: Float32s) -> Float32s:
     return color
 
 
-def _mixed(matrix: FloatArray, planes: Float32s) -> Float32s:
+def _mixed(matrix: FloatArray, planes: SingleArray) -> SingleArray:
     """A matrix (3, 3) applied to the colours of planes (3, h, w), row of pixels by row."""
     rows = np.matmul(matrix.astype(np.float32), planes.swapaxes(0, 1))
     return np.asarray(rows.swapaxes(0, 1))
 
 
-def _lab_curve(t: Float32s) -> Float32s:
+def _lab_curve(t: SingleArray) -> SingleArray:
     """Cube root above (6/29)^3, its tangent below, as a sum of both: no choice per pixel."""
     delta = 6 / 29
     low = np.minimum(t, np.float32(delta**3)) - np.float32(delta**3)
@@ -177,7 +174,7 @@ def _kernels() -> tuple[list[FloatArray], list[FloatArray], list[FloatArray]]:
     return single, [k / norm for k in double], [blur / blur.sum(), *features]
 
 
-def _band(kernel: FloatArray) -> Float32s:
+def _band(kernel: FloatArray) -> SingleArray:
     """(BLOCK, BLOCK + 2 RADIUS) Toeplitz matrix: row i holds the kernel from column i on."""
     band = np.zeros((BLOCK, BLOCK + 2 * RADIUS), np.float32)
     for i in range(BLOCK):
@@ -185,20 +182,20 @@ def _band(kernel: FloatArray) -> Float32s:
     return band
 
 
-def _padded(picture: Float32s) -> Float32s:
+def _padded(picture: SingleArray) -> SingleArray:
     """(3, H + 2 RADIUS, W + 2 RADIUS) from (h, w, 3): H, W multiples of BLOCK, edges repeated."""
     extra = [(RADIUS, RADIUS + -n % BLOCK) for n in picture.shape[:2]]
     return np.pad(np.moveaxis(picture, 2, 0), ((0, 0), *extra), mode="edge")
 
 
-def _down(plane: Float32s, band: Float32s) -> Float32s:
+def _down(plane: SingleArray, band: SingleArray) -> SingleArray:
     """(H, W + 2 RADIUS) from (H + 2 RADIUS, W + 2 RADIUS): filtered along columns."""
     windows = sliding_window_view(plane, band.shape[1], axis=0)[::BLOCK]
     filtered = np.matmul(band, windows.swapaxes(1, 2))
     return np.asarray(filtered.reshape(-1, plane.shape[1]))
 
 
-def _across(plane: Float32s, band: Float32s) -> Float32s:
+def _across(plane: SingleArray, band: SingleArray) -> SingleArray:
     """(H, W) from (H, W + 2 RADIUS): filtered along rows."""
     windows = sliding_window_view(plane, band.shape[1], axis=1)[:, ::BLOCK]
     blocks = np.empty((*windows.shape[:2], BLOCK), np.float32)

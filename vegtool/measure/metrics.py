@@ -13,15 +13,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.ndimage import grey_closing, minimum_filter
 from skimage.metrics import structural_similarity
 
-from vegtool.arrays import checked
+from vegtool.arrays import Picture, SingleArray, checked
+from vegtool.measure.background import BACKGROUND, over
 from vegtool.measure.flip import Perceived, difference, perceived
-from vegtool.srgb import linear_from_srgb, srgb_from_linear
-
-Picture = npt.NDArray[np.float32]
+from vegtool.srgb import srgb_from_linear
 
 METRICS: dict[str, str] = {
     "flip": "FLIP, 0 to 1, lower is better",
@@ -35,9 +33,6 @@ METRICS: dict[str, str] = {
 }
 """What `score` tells: short title, unit, and which way is better."""
 
-BACKGROUND = linear_from_srgb(np.array([0.47, 0.55, 0.63], np.float32))
-"""(3,) linear: a dull sky, behind which neither light nor dark leaves vanish."""
-BACKGROUND.flags.writeable = False
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 """Of linear sRGB (Rec. 709); of encoded sRGB the same weights give luma."""
 PSNR_CAP = 100.0
@@ -62,10 +57,10 @@ class Reference:
     """
 
     picture: Picture
-    encoded: Picture
-    luma: Picture
+    encoded: SingleArray
+    luma: SingleArray
     perceived: Perceived
-    inside: Picture
+    inside: SingleArray
     covered: float
     luminance: float
 
@@ -76,7 +71,8 @@ def reference(picture: Picture) -> Reference:
     Raises ValueError for a picture that is not (h, w, 4), has no pixels or is not finite.
     """
     picture = _checked(picture)
-    linear, encoded = _over_background(picture)
+    linear = over(picture)
+    encoded = np.asarray(srgb_from_linear(linear))
     covered, luminance = _covered(picture)
     return Reference(
         picture, encoded, _luma(encoded), perceived(linear), _inside(picture[..., 3]),
@@ -90,7 +86,8 @@ def score(reference: Reference, picture: Picture) -> dict[str, float]:
     Raises ValueError for a picture of another size, or with values that are not finite.
     """
     picture = _checked(picture, reference.picture.shape)
-    linear, encoded = _over_background(picture)
+    linear = over(picture)
+    encoded = np.asarray(srgb_from_linear(linear))
     covered, luminance = _covered(picture)
     truth, level = reference.picture[..., 3], picture[..., 3]
     area = max(reference.covered, SAMPLE)
@@ -118,12 +115,6 @@ def _checked(picture: Picture, shape: tuple[int, ...] | None = None) -> Picture:
     return picture
 
 
-def _over_background(picture: Picture) -> tuple[Picture, Picture]:
-    """(h, w, 3) over the background: linear, 0 to 1, and the same encoded as sRGB."""
-    linear = np.clip(picture[..., :3] + (1 - picture[..., 3:]) * BACKGROUND, 0, 1)
-    return linear, np.asarray(srgb_from_linear(linear))
-
-
 def _covered(picture: Picture) -> tuple[float, float]:
     """Pixels covered, and the mean linear luminance of what covers them, 0 for nothing."""
     covered = _sum(picture[..., 3])
@@ -131,7 +122,7 @@ def _covered(picture: Picture) -> tuple[float, float]:
     return covered, light / covered if covered > 0 else 0.0
 
 
-def _inside(coverage: Picture) -> Picture:
+def _inside(coverage: SingleArray) -> SingleArray:
     """(h, w) 0 to 1: least coverage of the closed silhouette in the pixel and its neighbours."""
     y, x = np.mgrid[-GAP : GAP + 1, -GAP : GAP + 1]
     disc = x * x + y * y <= (GAP + 0.5) ** 2
@@ -140,7 +131,7 @@ def _inside(coverage: Picture) -> Picture:
     return np.asarray(minimum_filter(closed, 3, mode="constant", cval=0.0))
 
 
-def _luma(encoded: Picture) -> Picture:
+def _luma(encoded: SingleArray) -> SingleArray:
     """(h, w) of an encoded picture, on as much background as SSIM's window needs."""
     luma = encoded @ LUMINANCE
     missing = [max(SSIM_WINDOW - n, 0) for n in luma.shape]
@@ -150,14 +141,14 @@ def _luma(encoded: Picture) -> Picture:
     return np.pad(luma, [(n // 2, n - n // 2) for n in missing], constant_values=background)
 
 
-def _ssim(truth: Picture, level: Picture) -> float:
+def _ssim(truth: SingleArray, level: SingleArray) -> float:
     similarity = structural_similarity(  # type: ignore[no-untyped-call]
         truth, level, win_size=SSIM_WINDOW, data_range=1.0
     )
     return float(similarity)
 
 
-def _psnr(truth: Picture, level: Picture) -> float:
+def _psnr(truth: SingleArray, level: SingleArray) -> float:
     """Peak signal-to-noise ratio over the three encoded channels, dB, at most PSNR_CAP."""
     error = _mean((truth - level) ** 2)
     return float(-10 * np.log10(max(error, 10 ** (-PSNR_CAP / 10))))
@@ -174,9 +165,9 @@ def _shading_rmse(truth: Picture, level: Picture) -> float:
     return float(np.sqrt(_sum(weight * error) / _sum(weight)))
 
 
-def _sum(values: Picture) -> float:
+def _sum(values: SingleArray) -> float:
     return float(values.sum(dtype=np.float64))
 
 
-def _mean(values: Picture) -> float:
+def _mean(values: SingleArray) -> float:
     return float(values.mean(dtype=np.float64))

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-from vegtool.arrays import ByteArray, FloatArray
+from vegtool.arrays import FloatArray, Picture
 from vegtool.gl.context import describe
 from vegtool.gl.count import count_fragments
-from vegtool.gl.draw import MSAA, Light, Picture, Shot, draw
+from vegtool.gl.draw import MSAA, Light, Shot, draw
 from vegtool.gl.timing import time_frames
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Level, billboard_quads
 from vegtool.measure.views import Camera
 from vegtool.plant import Material, Plant, Texture
-from vegtool.srgb import srgb_from_linear
 
 TRUTH_SUPERSAMPLE = 8
 """Samples per axis and pixel."""
@@ -87,9 +85,3 @@ def frame_seconds(
 
 def _shot(camera: Camera) -> Shot:
     return Shot(camera.view_projection(), camera.target, camera.width, camera.height)
-
-
-def over(picture: Picture, background: npt.ArrayLike) -> ByteArray:
-    """A linear premultiplied picture (h, w, 4) over a linear colour (3,): sRGB bytes (h, w, 3)."""
-    linear = picture[..., :3] + (1 - picture[..., 3:]) * np.asarray(background, np.float32)
-    return np.asarray((srgb_from_linear(np.clip(linear, 0, 1)) * 255 + 0.5).astype(np.uint8))

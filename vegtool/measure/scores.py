@@ -16,9 +16,9 @@ from typing import TypeVar
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from vegtool.arrays import FloatArray
+from vegtool.arrays import FloatArray, Picture
 from vegtool.errors import UsageError
-from vegtool.gl.draw import Light, Picture
+from vegtool.gl.draw import Light
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Display, Level, Spread
 from vegtool.measure.metrics import METRICS, Reference, reference, score

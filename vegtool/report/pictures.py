@@ -12,12 +12,13 @@ import numpy as np
 from matplotlib import colormaps
 from PIL import Image
 
+from vegtool.arrays import Picture, SingleArray
 from vegtool.gl.draw import Light
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Display, Level
-from vegtool.measure.flip import Float32s, difference, perceived
-from vegtool.measure.metrics import BACKGROUND, Picture
-from vegtool.measure.pictures import client_plant, live, over, truth
+from vegtool.measure.background import bytes_over, over
+from vegtool.measure.flip import difference, perceived
+from vegtool.measure.pictures import client_plant, live, truth
 from vegtool.measure.views import CLOSEST, Camera, View, around, direction, distance_of
 from vegtool.report.entries import Entry, Shown
 from vegtool.report.rows import Pictures
@@ -63,7 +64,7 @@ def _nearest(size: int, family: str, among: Sequence[Entry]) -> Entry:
 
 def of_truth(scene: Scene) -> Pictures:
     """The truth, as PNGs by size."""
-    return {size: (_png(Image.fromarray(over(t, BACKGROUND))),) for size, t in scene.truths.items()}
+    return {size: (_png(Image.fromarray(bytes_over(t))),) for size, t in scene.truths.items()}
 
 
 def of_shown(shown: Shown, scene: Scene, sizes: Sequence[int]) -> Pictures:
@@ -73,18 +74,13 @@ def of_shown(shown: Shown, scene: Scene, sizes: Sequence[int]) -> Pictures:
     with PlantBuffers(client_plant(level), mipmaps=True) as buffers:
         for size in (s for s in sizes if s in scene.cameras):
             picture = live(buffers, scene.cameras[size], Light(direction=VIEW.sun))
-            error = difference(*(perceived(_linear(p)) for p in (scene.truths[size], picture)))
-            shown_over = Image.fromarray(over(picture, BACKGROUND))
+            error = difference(*(perceived(over(p)) for p in (scene.truths[size], picture)))
+            shown_over = Image.fromarray(bytes_over(picture))
             found[size] = (_png(shown_over), _png(_error_map(error)))
     return found
 
 
-def _linear(picture: Picture) -> Picture:
-    """(h, w, 3) over the background, 0 to 1."""
-    return np.asarray(np.clip(picture[..., :3] + (1 - picture[..., 3:]) * BACKGROUND, 0, 1))
-
-
-def _error_map(error: Float32s) -> Image.Image:
+def _error_map(error: SingleArray) -> Image.Image:
     """Errors (h, w), 0 to 1, from black to yellow."""
     image = Image.fromarray((255 * error + 0.5).astype(np.uint8), "P")
     palette = colormaps["magma"](np.arange(256), bytes=True)[:, :3]

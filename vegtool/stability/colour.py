@@ -7,12 +7,11 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
+from vegtool.arrays import Picture
 from vegtool.measure.metrics import PSNR_CAP, reference, score
 from vegtool.seeding import generator
 from vegtool.srgb import linear_from_srgb, srgb_from_linear
 from vegtool.stability.case import Case, Outcome, exact, holds
-
-Picture = npt.NDArray[np.float32]
 
 
 def evenly(value: float, coverage: float, size: tuple[int, int] = (24, 20)) -> Picture:
@@ -73,7 +72,7 @@ def any_pair(truth: Picture) -> Outcome:
 
 
 def any_size(size: tuple[int, int]) -> Outcome:
-    """Pictures of very few pixels, or of one row: the same score where all pixels are alike."""
+    """Pictures of very few pixels, or of one row: scores are numbers."""
     wrong = 0
     for a, b in ((noise(size), noise(size)), (noise(size), evenly(0.3, 0.6, size))):
         values = score(reference(a), b)
