@@ -2,7 +2,7 @@
 
 Made here and not by the driver: each level is rounded once and to the nearest, so that pictures are
 the same on every driver. Mesa's software rasteriser rounds sRGB upwards, 5 % of brightness by the
-eighth level.
+eighth level (docs/methods/agreement.md).
 """
 
 from __future__ import annotations
