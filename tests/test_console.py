@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 
 import pytest
 
@@ -36,3 +37,17 @@ def test_quiet_prints_nothing_but_errors(capsys: pytest.CaptureFixture[str]) -> 
     console.say("an error", at=-1)
     console.result({}, "for people")
     assert capsys.readouterr() == ("", "an error\n")
+
+
+def test_a_long_name_or_one_like_markup_leaves_the_bar_its_figures(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setattr("vegtool.console.BAR_AFTER_SECONDS", -1.0)
+    for name, value in (("COLUMNS", "80"), ("TERM", "xterm"), ("NO_COLOR", "1")):
+        monkeypatch.setenv(name, value)
+    with Console().bar("convert") as progress:
+        progress(f"a[blue]{'n' * 200}", 0.4)
+    shown = capsys.readouterr().err
+    assert "convert  a[blue]nnn" in shown
+    assert "40 % 0:00:00" in shown

@@ -43,14 +43,17 @@ class Console:
         from rich.console import Console as RichConsole
         from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
         from rich.progress import Progress as Bars
+        from rich.table import Column
 
+        what = Column(ratio=1, no_wrap=True, overflow="ellipsis")  # a long name is cut, no figure
         bars = Bars(
-            TextColumn("{task.description}"),
-            BarColumn(),
+            TextColumn("{task.description}", markup=False, table_column=what),
+            BarColumn(20),
             TextColumn("{task.percentage:>3.0f} %"),
             TimeElapsedColumn(),
             console=RichConsole(stderr=True),
             transient=True,
+            expand=True,
         )
         task = bars.add_task(title, total=1.0)
         started, shown = monotonic(), False
