@@ -43,6 +43,8 @@ MOST_OF_PREVIOUS = 0.5
 MAKING = 0.4
 """Share of the time that goes into levels that are measured, about."""
 
+MOST_BILLBOARDS = 100_000
+
 TRIANGLES_PER_BILLBOARD = 2
 """At least: four where both sides have pictures of their own."""
 
@@ -61,7 +63,7 @@ class ConvertOptions:
         512,
         "Planes of the first billboard level; crossed shapes count two or three.",
         least=1,
-        most=100_000,
+        most=MOST_BILLBOARDS,
         short="b",
     )
     levels: int = option(

@@ -37,6 +37,12 @@ def option(
     return field(default=default, metadata=about)
 
 
+def same_option(options: type, name: str) -> Any:
+    """A field for an option that another options dataclass has already."""
+    same = next(item for item in fields(options) if item.name == name)
+    return field(default=same.default, metadata=same.metadata)
+
+
 def check_limits(options: Any) -> None:
     """Hold every field of an options dataclass to its limits and choices.
 

@@ -2,22 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
-from typing import Any
+from dataclasses import dataclass
 
 from vegtool.clustering import METHODS
+from vegtool.convert import MOST_BILLBOARDS, ConvertOptions
 from vegtool.errors import UsageError
 from vegtool.lod import Display
 from vegtool.measure.options import MeasureOptions
-from vegtool.options import option
-
-MOST_BILLBOARDS = 100_000
-
-
-def _as_for_convert(name: str) -> Any:
-    """The same option as measuring has in a conversion."""
-    same = next(item for item in fields(MeasureOptions) if item.name == name)
-    return field(default=same.default, metadata=same.metadata)
+from vegtool.options import option, same_option
 
 
 @dataclass(frozen=True)
@@ -33,23 +25,13 @@ class ReportOptions:
     budgets: str = option(
         "16,64,256,1024", "Billboards of each method, with commas between.", metavar="N,..."
     )
-    views: str = _as_for_convert("views")
+    views: str = same_option(MeasureOptions, "views")
     view_count: int = option(12, "Directions that every error is a mean over.", least=1, most=1000)
-    max_error: float | None = _as_for_convert("max_error")
-    max_pixels: float | None = _as_for_convert("max_pixels")
-    fov: float = option(
-        Display().fov_y_deg,
-        "Vertical field of view that distances are for, in degrees.",
-        least=1.0,
-        most=170.0,
-    )
-    image_height: int = option(
-        Display().image_height_px,
-        "Image height that distances are for, in pixels.",
-        least=16,
-        most=32768,
-    )
-    seed: int = option(0, "Seed of every random choice.", least=0)
+    max_error: float | None = same_option(MeasureOptions, "max_error")
+    max_pixels: float | None = same_option(MeasureOptions, "max_pixels")
+    fov: float = same_option(ConvertOptions, "fov")
+    image_height: int = same_option(ConvertOptions, "image_height")
+    seed: int = same_option(ConvertOptions, "seed")
 
     def __post_init__(self) -> None:
         _ = self.method_names, self.budget_counts
