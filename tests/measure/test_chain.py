@@ -84,14 +84,15 @@ def pixels_of(bush: Plant, level: Level) -> float:
 def test_a_level_starts_where_its_curve_crosses_the_limit(
     bush: Plant, by_rule: LodChain, curves: Curves
 ) -> None:
-    """Finer: below from 60 pixels down. Coarser: from 30 down. Measured at 50 and 25 only."""
-    curves(lambda pixels: (0.0, 0.1 * pixels / 60, 0.1 * pixels / 30))
+    """Finer: below from 40 pixels down. Coarser: from 30, where its texels are too large yet."""
+    curves(lambda pixels: (0.0, 0.1 * pixels / 40, 0.1 * pixels / 30))
     (finer, coarser), notes = with_distances(
         bush, by_rule.levels[1:], MeasureOptions(max_error=0.1), Display()
     )
     assert not notes
-    assert pixels_of(bush, finer) == pytest.approx(50, rel=0.01), "measured no nearer"
-    assert 25 < pixels_of(bush, coarser) < 30, "interpolated, held at that very distance"
+    assert 35 < pixels_of(bush, finer) < 40, "interpolated, held at that very distance"
+    texel = Display().distance_m(coarser.texels_per_metre)
+    assert coarser.near_distance_m == pytest.approx(texel, rel=0.01), "a texel covers a pixel"
     assert finer.measured is not None
     assert finer.measured.held_out is not None
 

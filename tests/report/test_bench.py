@@ -137,8 +137,8 @@ def test_coarse_texels_and_displacement_move_distances_away(
     made: dict[str, tuple[Row, Any]],
 ) -> None:
     live, finer, coarser, impostor = chain(made)
-    half = OPTIONS.display.pixels_per_metre(30.0) / 2  # a texel covers two pixels from 30 m on
-    rows = [live, replace(finer, texels_per_metre=half), coarser, impostor]
+    coarse = OPTIONS.display.pixels_per_metre(30.0)  # a texel covers a pixel from 30 m on
+    rows = [live, replace(finer, texels_per_metre=coarse), coarser, impostor]
     assert _with_distances(rows, OPTIONS)[1].switch_distance_m == pytest.approx(30.0, rel=0.01)
     limited = replace(OPTIONS, max_pixels=1.0)
     bounded = [replace(row, within_pixels_from_m=40.0) for row in rows[:3]]

@@ -128,7 +128,8 @@ def test_forced_and_with_a_limit_and_without_gltfpack(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """Nothing errs by more than 1, so that with this limit all may be used from the nearest."""
+    """Nothing errs by more than 1: with this limit all may be used from where their texels are
+    small enough, which are 256 along the longest side of two crossed billboards."""
     for path in made.iterdir():
         (tmp_path / path.name).write_bytes(path.read_bytes())
     monkeypatch.setattr("vegtool.baselines.gltfpack.shutil.which", lambda name: None)
@@ -139,8 +140,9 @@ def test_forced_and_with_a_limit_and_without_gltfpack(
     (plant,) = json.loads((tmp_path / "report.json").read_text())["plants"]
     rows = {row["name"]: row for row in plant["rows"]}
     assert "gltfpack 4" not in rows
+    at_400_pixels = rows["crossed"]["distance_m"][0]
     assert rows["crossed"]["switch_distance_m"] == pytest.approx(
-        rows["crossed"]["distance_m"][0], rel=0.01
+        at_400_pixels * 400 / 256, rel=0.01
     )
 
 

@@ -28,9 +28,6 @@ from vegtool.progress import Progress, silent
 QUICK_VIEWS, FULL_VIEWS = 6, 12
 """Six leave a standard error of about 0.005 FLIP in the mean of a leafy plant, twelve 0.003."""
 FULL_LADDER = tuple(LADDER[0] / 2 ** (i / 2) for i in range(2 * len(LADDER) - 1))
-MAGNIFIED = 2.0
-"""Pixels that a texel may cover: no level is used nearer than half the distance that its atlas was
-made for. What is smeared so is seen sooner than a mean error over the picture tells."""
 SMALLEST = 3.0
 """Pixels. Where no level suffices at the usual sizes, smaller ones are tried down to this one."""
 HELD_OUT_VIEWS, HELD_OUT_PHASE = 12, 0.5
@@ -165,8 +162,9 @@ class _Bench:
 
 
 def _by_texels(levels: Sequence[Level], display: Display) -> list[float]:
-    """Metres from which a texel of each level covers no more than MAGNIFIED pixels."""
-    return [display.distance_m(MAGNIFIED * level.texels_per_metre) for level in levels]
+    """Metres from which a texel of each level covers no more than a pixel: the distance that its
+    atlas was made for. What is smeared is seen sooner than a mean error over the picture tells."""
+    return [display.distance_m(level.texels_per_metre) for level in levels]
 
 
 def _unmeasured(

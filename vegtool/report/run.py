@@ -22,7 +22,6 @@ from vegtool import __version__
 from vegtool.errors import CapabilityError, VegtoolError
 from vegtool.formats import ReadOptions, read_plant
 from vegtool.gl.upload import PlantBuffers
-from vegtool.measure.chain import MAGNIFIED
 from vegtool.measure.distances import LeftOut, limits, switch_distances
 from vegtool.measure.pictures import renderer
 from vegtool.plant import Plant
@@ -180,7 +179,7 @@ def _least_m(row: Row, options: ReportOptions) -> float | None:
     """Metres from which a row's texels are small enough, and what it displaces little enough; None
     where that is not known."""
     texels = row.texels_per_metre
-    near = options.display.distance_m(MAGNIFIED * texels) if texels else 0.0
+    near = options.display.distance_m(texels) if texels else 0.0
     if options.max_pixels is None:
         return near
     return None if row.within_pixels_from_m is None else max(near, row.within_pixels_from_m)
