@@ -29,7 +29,7 @@ from vegtool.formats.gltf import plant_glb
 from vegtool.growth import sample
 from vegtool.report import report
 from vegtool.report.options import ReportOptions
-from vegtool.report.plots import COSTS, error_against, png
+from vegtool.report.plots import COST_AXES, error_against, png
 from vegtool.report.rows import Report
 from vegtool.report.summary import Point, medians, points
 
@@ -100,7 +100,7 @@ def write_page(made: Report) -> None:
     """docs/error_against_time.md and its plot."""
     PAGE.write_text(document(made), encoding="utf-8")
     title = f"Error against the time to make it: medians of {len(made.plants)} plants"
-    figure = error_against(medians(made.plants), COSTS[0], title)
+    figure = error_against(medians(made.plants), COST_AXES[0], title)
     PAGE.with_suffix(".png").write_bytes(png(figure))
 
 

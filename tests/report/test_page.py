@@ -16,7 +16,7 @@ import pytest
 from report_cases import PIXELS, plant_report, report
 
 from vegtool.report.page import page
-from vegtool.report.plots import COSTS
+from vegtool.report.plots import COST_AXES
 from vegtool.report.write import csv_text, encoded, write
 
 VOID = {"meta", "img", "br", "link"}
@@ -55,7 +55,7 @@ class Checker(HTMLParser):
 def few_plots() -> Iterator[None]:
     """Plots are tests/report/test_plots.py's; here a few suffice."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("vegtool.report.page.COSTS", COSTS[:1])
+        patch.setattr("vegtool.report.page.COST_AXES", COST_AXES[:1])
         yield
 
 

@@ -47,7 +47,7 @@ def made(model: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A finished report of it."""
     out = tmp_path_factory.mktemp("made")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("vegtool.report.page.COSTS", plots.COSTS[:1])
+        patch.setattr("vegtool.report.page.COST_AXES", plots.COST_AXES[:1])
         assert run(["report", str(model), "-o", str(out), "-q", *SMALL]) == 0
     return out
 
@@ -191,6 +191,7 @@ def test_an_only_plant_that_is_broken(tmp_path: Path, capsys: pytest.CaptureFixt
         (["--budgets=-4"], "got -4"),
         (["--budgets", "0"], "got 0"),
         (["--budgets", "many"], "got many"),
+        (["--budgets", "9" * 5000], "got 999"),
         (["--budgets", ""], "got none"),
         (
             ["--methods", "kmeans,voronoi"],

@@ -32,6 +32,10 @@ METRICS: dict[str, str] = {
     "shading_rmse": "Shading error, RMSE in linear light, lower is better",
 }
 """What `score` tells: short title, unit, and which way is better."""
+SIGNED = ("coverage_bias", "color_bias")
+"""Best at 0, from both sides."""
+GREATER_IS_BETTER = ("ssim", "psnr")
+"""Of the others less is."""
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 """Of linear sRGB (Rec. 709); of encoded sRGB the same weights give luma."""

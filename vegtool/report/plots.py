@@ -76,22 +76,25 @@ STYLE: Any = {
 
 
 @dataclass(frozen=True)
-class Cost:
-    """An axis: an attribute of Point, and what it is called."""
+class CostAxis:
+    """A cost to plot against: an attribute of Point, its label, and the plot's title."""
 
     name: str
     label: str
+    title: str
 
 
-COSTS = (
-    Cost("bake_seconds", "time to make it, seconds"),
-    Cost("triangles", "triangles"),
-    Cost("texture_bytes", "bytes of its textures"),
-    Cost("frame_ms", "time of a frame, milliseconds"),
+COST_AXES = (
+    CostAxis("bake_seconds", "time to make it, seconds", "Error against the time to make it"),
+    CostAxis("triangles", "triangles", "Error against triangles"),
+    CostAxis("texture_bytes", "bytes of its textures", "Error against bytes of textures"),
+    CostAxis("frame_ms", "time of a frame, milliseconds", "Error against frame time"),
 )
 
 
-def error_against(points: Sequence[Point], cost: Cost, title: str, metric: str = "flip") -> Figure:
+def error_against(
+    points: Sequence[Point], cost: CostAxis, title: str, metric: str = "flip"
+) -> Figure:
     """A panel per size: the metric's mean against a cost."""
     sizes = [s for s in SIZES if any(s in p.pixels for p in points)] or [points[0].pixels[0]]
     with rc_context(STYLE):
@@ -122,7 +125,7 @@ class _Lines:
     others: list[Line]
 
 
-def _panel(axes: Axes, points: list[Point], cost: Cost, metric: str, size: float) -> _Lines:
+def _panel(axes: Axes, points: list[Point], cost: CostAxis, metric: str, size: float) -> _Lines:
     """Draw a panel. What costs nothing has no place on its axis."""
     errors = {p.name: p.errors[metric][p.pixels.index(size)] for p in points}
     at = {p.name: (float(getattr(p, cost.name)), errors[p.name].mean) for p in points}
@@ -160,7 +163,7 @@ def _words(axes: Axes, lines: _Lines) -> None:
         labels.write_if_free(str(budget), point, 7.0, FAINT)
 
 
-def _axis(axes: Axes, cost: Cost, values: list[float]) -> None:
+def _axis(axes: Axes, cost: CostAxis, values: list[float]) -> None:
     """A logarithmic axis, with numbers at 1, 2 and 5 where it spans few powers of ten."""
     positive = [value for value in values if value > 0]
     axes.set_xscale("log")
