@@ -5,12 +5,12 @@ import pytest
 from baselines.baseline_cases import plant_from, sphere
 
 from vegtool.arrays import unit
-from vegtool.baselines.octahedral import FRAMES, Octahedral, directions, nearest, upright
+from vegtool.baselines.octahedral import FRAMES, Octahedral, directions, nearest
 from vegtool.gl.draw import Light
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Display
 from vegtool.measure.pictures import client_plant, live, truth
-from vegtool.measure.views import View, around
+from vegtool.measure.views import View, around, upright
 from vegtool.plant import Material
 
 UP = np.array([0.0, 1.0, 0.0])

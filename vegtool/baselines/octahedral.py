@@ -18,7 +18,7 @@ from vegtool.baking.options import BakeOptions
 from vegtool.baking.sides import pictures_of
 from vegtool.gl.pictures import draw_pictures
 from vegtool.lod import Atlas, Billboards, Level
-from vegtool.measure.views import View
+from vegtool.measure.views import View, upright
 from vegtool.plant import Plant
 from vegtool.timing import timed
 
@@ -39,15 +39,6 @@ def directions(side: int = FRAMES) -> FloatArray:
     y = 1 - np.abs(x) - np.abs(z)
     below = np.maximum(-y, 0.0)
     return unit(np.stack([x - np.copysign(below, x), y, z - np.copysign(below, z)], axis=1))
-
-
-def upright(direction: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Unit vectors (3,) right and up of a picture seen from a direction, up as near +y as can be;
-    of one from straight above or below, up is -z."""
-    up = np.array([0.0, 0.0, -1.0]) if abs(direction[1]) > 0.999 else np.array([0.0, 1.0, 0.0])
-    right = np.cross(up, direction)
-    right /= np.linalg.norm(right)
-    return right, np.cross(direction, right)
 
 
 class Octahedral:

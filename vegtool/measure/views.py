@@ -65,11 +65,7 @@ class Camera:
     @property
     def axes(self) -> FloatArray:
         """(3, 3) rows: right, up, and back towards the eye."""
-        back = self.direction
-        up = np.array([0.0, 0.0, -1.0]) if abs(back[1]) > 0.999 else np.array([0.0, 1.0, 0.0])
-        right = np.cross(up, back)
-        right /= np.linalg.norm(right)
-        return np.stack([right, np.cross(back, right), back])
+        return np.stack([*upright(self.direction), self.direction])
 
     def pixels(self, points: FloatArray) -> FloatArray:
         """(n, 2) where points (n, 3), metres, lie in the picture: right and down, in pixels."""
@@ -97,6 +93,15 @@ class Camera:
         projection[2, 2:] = [(far + near) / (near - far), 2 * far * near / (near - far)]
         projection[3, 2] = -1
         return projection @ view
+
+
+def upright(direction: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Unit vectors (3,) right and up of a picture seen from a direction, (3,) unit, up as near +y
+    as can be; of one from straight above or below, up is -z."""
+    up = np.array([0.0, 0.0, -1.0]) if abs(direction[1]) > 0.999 else np.array([0.0, 1.0, 0.0])
+    right = np.cross(up, direction)
+    right /= np.linalg.norm(right)
+    return right, np.cross(direction, right)
 
 
 def framed(

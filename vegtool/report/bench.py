@@ -76,7 +76,7 @@ def measured(
         entry.family,
         entry.budget,
         _cost(bench, made, level, peak.mb),
-        entry.pixels,
+        entry.made_for_pixels,
         _floats(bench.truths.pixels),
         _floats(bench.truths.distance_m),
         {metric: tuple(_floats(v) for v in values) for metric, values in found.values.items()},

@@ -40,14 +40,14 @@ class Made:
 class Entry:
     """A row to be: its name, unique within a plant; its family; the budget of billboards, or None.
 
-    pixels: size on screen that it is made for, or None. make: from the plant's buffers (without
-    mipmaps), what is shown; raises CapabilityError where it cannot be made here.
+    made_for_pixels: size on screen that it is made for, or None. make: from the plant's buffers
+    (without mipmaps), what is shown; raises CapabilityError where it cannot be made here.
     """
 
     name: str
     family: str
     budget: int | None
-    pixels: float | None
+    made_for_pixels: float | None
     make: Callable[[PlantBuffers, Progress], Made]
 
 

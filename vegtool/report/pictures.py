@@ -59,7 +59,7 @@ def sizes_of(entry: Entry, among: Sequence[Entry]) -> list[int]:
 
 def _nearest(size: int, family: str, among: Sequence[Entry]) -> Entry:
     own = [entry for entry in among if entry.family == family]
-    return min(own, key=lambda e: 0.0 if e.pixels is None else abs(log(e.pixels / size)))
+    return min(own, key=lambda e: abs(log(e.made_for_pixels / size)) if e.made_for_pixels else 0.0)
 
 
 def of_truth(scene: Scene) -> Pictures:
