@@ -55,7 +55,7 @@ class ReportOptions:
     def budget_counts(self) -> tuple[int, ...]:
         """The budgets, smallest first."""
         words = _words(self.budgets)
-        wrong = [w for w in words if not w.isdecimal() or not 1 <= int(w) <= MOST_BILLBOARDS]
+        wrong = [word for word in words if not _is_budget(word)]
         if wrong or not words:
             found = ", ".join(wrong) or "none"
             raise UsageError(
@@ -63,6 +63,10 @@ class ReportOptions:
                 f"between, such as 16,64,256; got {found}"
             )
         return tuple(sorted({int(word) for word in words}))
+
+
+def _is_budget(word: str) -> bool:
+    return word.isdecimal() and len(word) < 10 and 1 <= int(word) <= MOST_BILLBOARDS
 
 
 def _words(text: str) -> tuple[str, ...]:
