@@ -18,6 +18,7 @@ import argparse
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -76,12 +77,12 @@ def plants() -> dict[str, Callable[[], Plant]]:
     """Name -> what reads or grows it: the real plants there are, then the samples."""
     folder = Path(os.environ.get("VEGTOOL_MODELS") or ROOT.parent / "shared" / "models")
     found: dict[str, Callable[[], Plant]] = {
-        Path(name).parts[0]: lambda name=name: read_plant(folder / name)  # type: ignore[misc]
+        Path(name).parts[0]: partial(read_plant, folder / name)
         for name in MODELS
         if (folder / name).exists()
     }
     for name in SAMPLES:
-        found[f"{name} sample"] = lambda name=name: sample(name)  # type: ignore[misc]
+        found[f"{name} sample"] = partial(sample, name)
     return found
 
 

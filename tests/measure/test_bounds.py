@@ -14,6 +14,7 @@ from plants import plant_of
 from vegtool.arrays import FloatArray, IntArray
 from vegtool.boxes import BoxOptions, make_billboards
 from vegtool.boxes.error import surface_samples
+from vegtool.boxes.options import Shape
 from vegtool.clustering import ClusterOptions, cluster
 from vegtool.growth import sample
 from vegtool.lod import Atlas, Billboards, Display, Level
@@ -286,15 +287,15 @@ def test_a_mesh_counts_by_its_geometric_error() -> None:
 
 
 @pytest.mark.parametrize("shape", ["auto", "crossed"])
-def test_a_plant_is_displaced_by_no_more_than_the_bounds(shape: str) -> None:
+def test_a_plant_is_displaced_by_no_more_than_the_bounds(shape: Shape) -> None:
     """Its boxes hold what they show: every plane of crossed ones answers for the whole cluster."""
     plant = sample("broadleaf", 3000)
     labels = cluster(plant, "kmeans", 40, ClusterOptions(), 0)
-    billboards = make_billboards(plant, labels, BoxOptions(shape=shape, plane="orientation"))  # type: ignore[arg-type]
+    billboards = make_billboards(plant, labels, BoxOptions(shape=shape, plane="orientation"))
     face, points = surface_samples(plant, 4000)
     sample_index, shown_by = np.nonzero(labels[face][:, None] == billboards.cluster)
     for view in views("all", 6):
-        distance = DISPLAY.distance_m(200 / np.ptp(plant.bounds, axis=0).max())
+        distance = DISPLAY.distance_m(200 / plant.extent)
         seen = around(plant.positions, view.direction, distance, DISPLAY)
         measured = np.zeros(len(billboards))
         pixels = displacement(points[sample_index], shown_by.astype(np.int32), billboards, seen)

@@ -22,8 +22,9 @@ def row(
     plant: str = "oak",
 ) -> Row:
     """A row measured from two views, whose FLIP errors lie 0.01 to either side of `flip`."""
+    values: dict[str, tuple[tuple[float, float], ...]]
     values = dict.fromkeys(METRICS, ((0.4, 0.6), (0.4, 0.6)))
-    values["flip"] = tuple((f - 0.01, f + 0.01) for f in flip)  # type: ignore[assignment]
+    values["flip"] = tuple((f - 0.01, f + 0.01) for f in flip)
     frame = FrameTime(frame_ms, (frame_ms - 0.5, frame_ms + 0.5), 30, "llvmpipe")
     making = {"clustering": seconds / 2, "draw": seconds / 2} if seconds else {}
     cost = Cost(triangles, triangles // 2, 1000, 5000, 1, 1.5, frame, making, 300.0)

@@ -14,6 +14,7 @@ from vegtool.report.plots import (
     COST_AXES,
     IN_PAGE,
     LOOKS,
+    CostAxis,
     error_against,
     error_against_distance,
     look,
@@ -27,7 +28,7 @@ POINTS = points(plant_report())
 
 
 @pytest.mark.parametrize("cost", COST_AXES, ids=lambda cost: cost.name)
-def test_each_family_is_named_once_in_each_panel(cost) -> None:  # type: ignore[no-untyped-def]
+def test_each_family_is_named_once_in_each_panel(cost: CostAxis) -> None:
     figure = error_against(POINTS, cost, "title")
     for axes in figure.axes:
         words = [t.get_text() for t in axes.texts]

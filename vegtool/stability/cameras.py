@@ -17,7 +17,7 @@ from vegtool.lod import Display
 from vegtool.measure.metrics import reference, score
 from vegtool.measure.options import MeasureOptions
 from vegtool.measure.pictures import TRUTH_SUPERSAMPLE, live, truth
-from vegtool.measure.views import Camera, around, direction
+from vegtool.measure.views import Camera, around, direction, distance_of
 from vegtool.plant import Material
 from vegtool.seeding import generator
 from vegtool.stability.case import (
@@ -29,16 +29,14 @@ from vegtool.stability.case import (
     relative,
     same_objective,
 )
-from vegtool.stability.plants import FAR, Motion, box_faces, rotated, soup, tree
+from vegtool.stability.plants import MOTIONS, Motion, box_faces, rotated, soup, tree
 
 SIDE = 64
 """Pixels of most pictures here."""
 UPRIGHT = np.array([[0.6, 0.0, 0.8], [0.0, 1.0, 0.0], [-0.8, 0.0, 0.6]])
 """A turn about the vertical, which leaves the camera upright."""
-MOTIONS = (
-    Motion("5,000 km away", lambda p: p + FAR, np.eye(3), offset=float(np.linalg.norm(FAR))),
-    Motion("1e-6 times the size", lambda p: 1e-6 * p, np.eye(3), scale=1e-6),
-    Motion("1e6 times the size", lambda p: 1e6 * p, np.eye(3), scale=1e6),
+UPRIGHT_MOTIONS = (
+    *(motion for motion in MOTIONS if not motion.turns),
     Motion("turned about the vertical", lambda p: rotated(p, UPRIGHT), UPRIGHT),
 )
 
@@ -135,10 +133,8 @@ def grazing() -> Outcome:
 def small_plant(pixels: float) -> Outcome:
     """A tree of less than a pixel: it covers something within a sample, and scores are numbers."""
     display = Display()
-    size = float((tree().bounds[1] - tree().bounds[0]).max())
-    seen = around(
-        tree().positions, direction(30.0, 10.0), display.distance_m(pixels / size), display
-    )
+    distance_m = distance_of(tree(), display, pixels)
+    seen = around(tree().positions, direction(30.0, 10.0), distance_m, display)
     with PlantBuffers(tree()) as sharp, PlantBuffers(tree(), mipmaps=True) as mipped:
         right, shown = truth(sharp, seen), live(mipped, seen)
     values = list(score(reference(right), shown).values())
@@ -181,8 +177,9 @@ def own_picture() -> FloatArray:
 def view_of_tree() -> Camera:
     """The camera that sees the tree 100 pixels large."""
     display = Display()
-    size = float((tree().bounds[1] - tree().bounds[0]).max())
-    seen = camera(60.0, display.distance_m(100 / size), 1.5 * tree().radius, direction(30.0, 10.0))
+    seen = camera(
+        60.0, distance_of(tree(), display, 100), 1.5 * tree().radius, direction(30.0, 10.0)
+    )
     return replace(
         seen, target=tree().center, focal_px=display.pixels_per_metre(1.0),
         width=2 * SIDE, height=2 * SIDE, center_px=(SIDE, SIDE),
@@ -278,7 +275,7 @@ CASES = (
     *(
         Case(f"picture of a tree, {motion.name}", "cameras", "equivariance",
              partial(moved_picture, motion), gl=True)
-        for motion in MOTIONS
+        for motion in UPRIGHT_MOTIONS
     ),
     *(
         Case(f"convert, field of view {fov:g}, {height} pixels high", "cameras", "property",

@@ -13,7 +13,7 @@ from vegtool.measure.bounds import displacement_bound, distance_for_pixels, proj
 from vegtool.measure.distances import LeftOut, switch_distances
 from vegtool.seeding import generator
 from vegtool.stability.baking import clouds, moved
-from vegtool.stability.cameras import MOTIONS, moved_camera, plate, view_of_tree
+from vegtool.stability.cameras import UPRIGHT_MOTIONS, moved_camera, plate, view_of_tree
 from vegtool.stability.case import Case, Outcome, exact, holds, relative, same_objective
 from vegtool.stability.plants import Motion, soup
 
@@ -113,6 +113,6 @@ CASES = (
     *(
         Case(f"bounds of a tree's billboards, {motion.name}", "distances", "equivariance",
              partial(bounds_move, motion), gl=True)
-        for motion in MOTIONS
+        for motion in UPRIGHT_MOTIONS
     ),
 )  # fmt: skip
