@@ -26,10 +26,14 @@ class Check:
 
 OPTIONAL_PACKAGES = {
     "DracoPy": ("reads Draco-compressed glTF", "pip install 'vegtool[draco]'"),
+    "matplotlib": ("draws the plots of vegtool report", "pip install 'vegtool[report]'"),
 }
 
 OPTIONAL_PROGRAMS = {
-    "gltfpack": ("decompresses meshopt glTF, which vegtool cannot", "npm install -g gltfpack"),
+    "gltfpack": (
+        "a baseline of vegtool report; decompresses meshopt glTF, which vegtool cannot",
+        "npm install -g gltfpack",
+    ),
 }
 
 
