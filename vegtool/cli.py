@@ -186,13 +186,15 @@ def report_command(
         raise UsageError(f"expected {lacking}; got none")
     from vegtool.batch import find_jobs
     from vegtool.report import report as make_report
+    from vegtool.report.journal import NAME as JOURNAL
 
     sources = {job.name: job.source for job in find_jobs(inputs)}
     with console.bar("report") as progress:
         try:
             found = make_report(sources, report, read, out, force, progress)
         except KeyboardInterrupt:
-            console.say("rows that are finished are kept: the same command goes on from there")
+            if (out / JOURNAL).exists():
+                console.say("rows that are finished are kept: the same command goes on from there")
             raise
     from vegtool.report.text import as_summary, summary_text  # draws, which may not be possible
 

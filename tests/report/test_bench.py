@@ -170,3 +170,15 @@ def test_progress_rises_to_one_whatever_is_skipped() -> None:
             progress("measuring", 0.5)
             progress("done", 1.0)
     assert said == [0.0, 0.25, 0.5, 0.5, 0.75, 1.0]
+
+
+def test_the_time_that_is_left_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A terminal cuts the end off. Half of the work took 6 s, then 200 s."""
+    clock = iter((0.0, 0.0, 6.0, 200.0))
+    monkeypatch.setattr("vegtool.report.run.monotonic", lambda: next(clock))
+    said: list[str] = []
+    with _Clock(lambda stage, fraction: said.append(stage), 1.0).work("oak: row", 1.0) as progress:
+        for _ in range(3):
+            progress("measuring", 0.5)
+    whole = "oak: row: measuring"
+    assert said == [whole, f"6 s left, {whole}", f"3 min left, {whole}"]

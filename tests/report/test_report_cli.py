@@ -14,7 +14,7 @@ from vegtool.cli import run
 from vegtool.formats.gltf import plant_glb
 from vegtool.gl.context import context
 from vegtool.growth import sample
-from vegtool.report import bench, plots
+from vegtool.report import plots
 from vegtool.report import run as running
 from vegtool.report.journal import NAME as JOURNAL
 from vegtool.stability.case import CaseResult
@@ -110,6 +110,18 @@ def test_an_interrupted_report_goes_on_where_it_stopped(
     assert done == ROWS
     assert names(tmp_path) == FILES
     assert errors_of(tmp_path) == errors_of(made)
+
+
+def test_nothing_is_promised_where_nothing_was_finished(
+    model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def tired(*arguments: Any) -> Any:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(running, "read_plant", tired)
+    assert run(["report", str(model), "-o", str(tmp_path / "out"), *SMALL]) == 130
+    assert "goes on from there" not in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_folder_with_another_report_is_refused_unless_forced(
@@ -234,11 +246,13 @@ def test_no_plant_or_no_folder(
 def test_a_gl_that_cannot_multisample(
     model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """It is said before the truths are drawn."""
+    """It is said before anything is read, of several plants too."""
     monkeypatch.setattr(type(context()), "max_samples", property(lambda ctx: 1))
-    monkeypatch.setattr(bench, "truths", None)
-    assert run(["report", str(model), "-o", str(tmp_path / "out"), *SMALL]) == 5
-    assert "multisampling" in capsys.readouterr().err
+    monkeypatch.setattr(running, "read_plant", None)
+    for models in ([str(model)], [str(model), str(tmp_path / "no.glb")]):
+        assert run(["report", *models, "-o", str(tmp_path / "out"), *SMALL]) == 5
+        assert "multisampling" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(("passed", "code"), [(True, 0), (False, 4)])

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from vegtool.arrays import FloatArray, Picture
-from vegtool.gl.context import describe
+from vegtool.gl.context import context, describe
 from vegtool.gl.count import count_fragments
 from vegtool.gl.draw import MSAA, Light, Shot, draw
+from vegtool.gl.targets import drawing_target
 from vegtool.gl.timing import time_frames
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Level, billboard_quads
@@ -49,6 +50,12 @@ def renderer() -> dict[str, str]:
         "version": about.version,
         "largest texture": f"{about.max_texture} texels a side",
     }
+
+
+def check_drawing() -> None:
+    """Raise CapabilityError where there is no OpenGL, or none that draws what a client shows: to be
+    asked before long work."""
+    drawing_target(context(), (1, 1), MSAA)
 
 
 def truth(

@@ -30,8 +30,8 @@ def report(
     """Measure plants and write report.json, report.csv and report.html into a folder.
 
     sources: files by the names that the plants shall have. force: what stands in the folder is
-    overwritten. A plant that fails is named in the report, `failed`; the error of an only plant is
-    raised, and where all fail, the first one's. Raises UsageError for options out of range,
+    overwritten. A plant that fails is named in the report, `failed`, and where all do, nothing is
+    written; the error of an only plant is raised. Raises UsageError for options out of range,
     OutputError for a folder that may not be written to, CapabilityError where matplotlib is missing
     or nothing can draw.
     """

@@ -19,7 +19,6 @@ from vegtool.measure.bounds import (
     texel_error,
 )
 from vegtool.measure.cost import Cost, cost, peak_memory
-from vegtool.measure.pictures import live
 from vegtool.measure.scores import Truths, scores, truths
 from vegtool.measure.views import Camera, views
 from vegtool.plant import Plant
@@ -50,10 +49,8 @@ class Bench:
 
 
 def set_up(buffers: PlantBuffers, options: ReportOptions, progress: Progress = silent) -> Bench:
-    """Draw the truths of a plant. Raises CapabilityError where nothing can draw, or multisample."""
+    """Draw the truths of a plant. Raises CapabilityError where nothing can draw."""
     watched = scene(buffers, options.display)
-    for camera in watched.cameras.values():
-        live(buffers, camera)  # what a client needs is refused here, before the long work
     shown_from = views(options.views, options.view_count)
     drawn = truths(
         buffers.plant, shown_from, display=options.display, progress=progress, buffers=buffers

@@ -23,7 +23,7 @@ from vegtool.errors import CapabilityError, VegtoolError
 from vegtool.formats import ReadOptions, read_plant
 from vegtool.gl.upload import PlantBuffers
 from vegtool.measure.distances import LeftOut, limits, switch_distances
-from vegtool.measure.pictures import renderer
+from vegtool.measure.pictures import check_drawing, renderer
 from vegtool.plant import Plant
 from vegtool.progress import Progress
 from vegtool.report.bench import Bench, measured, set_up
@@ -50,6 +50,7 @@ def run(
     `failed`; where it is the only one, its error is raised. Raises CapabilityError where nothing
     can draw.
     """
+    check_drawing()
     todo = entries(options)
     found: list[PlantReport] = []
     failed: dict[str, str] = {}
@@ -92,7 +93,7 @@ class _Clock:
             done = self._done + units * fraction
             share = done / (self._done + self._left)
             left = _remaining(monotonic() - self._start, share)
-            self._progress(f"{what}: {stage}{left}", share)
+            self._progress(f"{left}{what}: {stage}", share)
 
         try:
             yield report
@@ -104,7 +105,7 @@ def _remaining(elapsed: float, share: float) -> str:
     if elapsed < 5 or share < 0.01:
         return ""
     seconds = elapsed / share - elapsed
-    return f", {seconds / 60:.0f} min left" if seconds > 90 else f", {seconds:.0f} s left"
+    return f"{seconds / 60:.0f} min left, " if seconds > 90 else f"{seconds:.0f} s left, "
 
 
 def _plant(
