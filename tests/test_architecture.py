@@ -33,7 +33,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "stability": {
         "branches", "clustering", "boxes", "gl", "baking", "measure", "convert", "growth",
     },
-    "report": {"formats", "clustering", "gl", "measure", "baselines", "convert"},
+    "report": {"formats", "clustering", "gl", "measure", "baselines", "convert", "console"},
+    "outcomes": {"batch", "console"},
     "inspect": {"branches", "formats", "console"},
     "doctor": {"measure"},
     "console": set(),
@@ -41,7 +42,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "__main__": {"cli"},
     "cli": {
         "batch", "console", "convert", "doctor", "flags", "formats", "growth", "inspect",
-        "measure", "report", "stability",
+        "measure", "outcomes", "report", "stability",
     },
 }  # fmt: skip
 

@@ -6,12 +6,11 @@ Exit codes: 0 done, 1 failed, 2 usage, 3 part of a batch failed, 4 a quality lim
 
 from __future__ import annotations
 
+import logging
 import re
 import signal
 import sys
-from dataclasses import asdict
 from io import TextIOWrapper
-from math import isfinite
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -107,6 +106,7 @@ def convert_command(
         vegtool convert models/ -o out/ -j 4 --method kmeans --billboards 256
     """
     from vegtool.batch import Task, convert_files, find_jobs
+    from vegtool.outcomes import as_summary, summary_text
 
     console = Console(-1 if quiet else verbose, json)
     todo = find_jobs(inputs)
@@ -127,7 +127,7 @@ def convert_command(
             spent = ", ".join(f"{stage} {s:.2f} s" for stage, s in row["seconds"].items())
             if spent:
                 console.say(f"{outcome.job.name}: level {row['level']}: {spent}", at=1)
-    console.result([_as_json(o) for o in outcomes], _summary(outcomes, dry_run))
+    console.result(as_summary(outcomes), summary_text(outcomes, dry_run))
     failed = [o for o in outcomes if o.error]
     missed = [f"{o.job.name}: {sentence}" for o in outcomes for sentence in o.misses]
     if missed and failed:
@@ -188,6 +188,7 @@ def report_command(
     from vegtool.report import report as make_report
     from vegtool.report.journal import NAME as JOURNAL
 
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it frets over its cache
     sources = {job.name: job.source for job in find_jobs(inputs)}
     with console.bar("report") as progress:
         try:
@@ -220,7 +221,7 @@ def _report_stability(console: Console, out: Path | None, force: bool, plants: b
             "--stability: checks cases of its own, no plants; leave out one of the two"
         )
     from vegtool.formats.atomic import FileSet, check_free
-    from vegtool.stability import markdown, run
+    from vegtool.stability import as_json, markdown, run
 
     if out is not None:
         check_free(out, ["stability.md"], force)
@@ -230,10 +231,7 @@ def _report_stability(console: Console, out: Path | None, force: bool, plants: b
     if out is not None:
         with FileSet(out, force) as files:
             files.add("stability.md", text.encode())
-    values = [asdict(result) for result in results]
-    for value in values:
-        value["error"] = value["error"] if isfinite(value["error"]) else None
-    console.result(values, text)
+    console.result(as_json(results), text)
     failed = [result.name for result in results if not result.passed]
     if failed:
         raise QualityError(f"{len(failed)} of {len(results)} cases failed: {', '.join(failed)}")
@@ -339,41 +337,6 @@ def _file_progress(todo: list[Any], progress: Any) -> Any:
         )
 
     return of
-
-
-def _as_json(outcome: Any) -> dict[str, Any]:
-    return {
-        "source": str(outcome.job.source),
-        "files": outcome.files,
-        "levels": list(outcome.levels),
-        "notes": list(outcome.notes),
-        "misses": list(outcome.misses),
-        "seconds": round(outcome.seconds, 3),
-        "error": outcome.error,
-    }
-
-
-def _summary(outcomes: list[Any], dry_run: bool) -> str:
-    blocks = []
-    for outcome in outcomes:
-        if outcome.error:
-            continue
-        shown = [{k: v for k, v in row.items() if k != "seconds"} for row in outcome.levels]
-        rows = [[_cell(v) for v in row.values()] for row in shown]
-        head = [name.replace("_", " ") for name in shown[0]]
-        total = human_bytes(sum(outcome.files.values()))
-        title = f"{outcome.job.name}: {outcome.seconds:.1f} s, {total}"
-        title += " would be written" if dry_run else ""
-        files = [f"  {path}  {human_bytes(size)}" for path, size in outcome.files.items()]
-        blocks.append("\n".join([title, table(head, rows), *files]))
-    return "\n\n".join(blocks)
-
-
-def _cell(value: Any) -> str:
-    """A figure as a person reads it; what there is none of is empty."""
-    if value is None:
-        return ""
-    return f"{value:,}" if isinstance(value, int) else str(value)
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from vegtool.console import table
 from vegtool.report.rows import Report
 from vegtool.report.summary import Point, medians, points
 from vegtool.report.write import FILES
@@ -60,12 +61,4 @@ def summary_text(report: Report, folder: Path) -> str:
         )
         for point in found
     ]
-    widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
-    lines = [
-        "  ".join(
-            c.ljust(w) if i == 0 else c.rjust(w)
-            for i, (c, w) in enumerate(zip(line, widths, strict=True))
-        )
-        for line in (head, *rows)
-    ]
-    return "\n".join([f"{of}: FLIP", *lines, "", str(folder / FILES[-1])])
+    return "\n".join([f"{of}: FLIP", table(head, rows), "", str(folder / FILES[-1])])

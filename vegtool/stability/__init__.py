@@ -1,7 +1,8 @@
 """Numerical stability: cases, each with its oracle, what it measured, and what it may measure.
 
-`run` runs them and `markdown` writes the table, which `vegtool report --stability` puts into
-docs/stability.md. A topic is one module with a tuple `CASES`, and one line in `TOPICS`.
+`run` runs them, `as_json` and `markdown` say what came of it; docs/stability.md is the latter, made
+by `vegtool report --stability`. A topic is one module with a tuple `CASES`, and one line in
+`TOPICS`.
 
 Oracles: "exact" knows the answer, in rational numbers or by construction; "equivariance" takes the
 same plant moved, scaled or turned and compares objectives, never axes or labels, which ties may
@@ -17,12 +18,12 @@ from typing import TYPE_CHECKING
 
 from vegtool.progress import Progress, silent
 from vegtool.stability.case import CaseResult, run_case
-from vegtool.stability.table import markdown
+from vegtool.stability.table import as_json, markdown
 
 if TYPE_CHECKING:
     from vegtool.stability.case import Case
 
-__all__ = ["CaseResult", "cases", "markdown", "run"]
+__all__ = ["CaseResult", "as_json", "cases", "markdown", "run"]
 
 TOPICS = (
     "clustering", "iterations", "boxes", "branches", "baking", "convert", "cameras", "distances",

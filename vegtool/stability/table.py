@@ -1,9 +1,12 @@
-"""The table of the cases as Markdown, for a file and for a terminal alike."""
+"""What came of the cases: as Markdown, for a file and a terminal alike, and as plain values."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from itertools import groupby
+from math import isfinite
+from typing import Any
 
 from vegtool.stability.case import CaseResult
 
@@ -43,6 +46,14 @@ def markdown(results: Sequence[CaseResult]) -> str:
         for result in group:
             lines.append(_row(_cells(result)))
     return "\n".join(lines) + "\n"
+
+
+def as_json(results: Sequence[CaseResult]) -> list[dict[str, Any]]:
+    """The rows as plain values; the error of a case that raised is None."""
+    return [
+        {**asdict(result), "error": result.error if isfinite(result.error) else None}
+        for result in results
+    ]
 
 
 def _cells(result: CaseResult) -> list[str]:

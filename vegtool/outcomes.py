@@ -1,0 +1,48 @@
+"""What conversions came to, in few words: for the terminal, and as JSON for programs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from vegtool.batch import Outcome
+from vegtool.console import human_bytes, table
+
+
+def as_summary(outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
+    """What `--json` prints."""
+    return [
+        {
+            "source": str(outcome.job.source),
+            "files": outcome.files,
+            "levels": list(outcome.levels),
+            "notes": list(outcome.notes),
+            "misses": list(outcome.misses),
+            "seconds": round(outcome.seconds, 3),
+            "error": outcome.error,
+        }
+        for outcome in outcomes
+    ]
+
+
+def summary_text(outcomes: Sequence[Outcome], dry_run: bool) -> str:
+    """The same for a person: a table of levels and the files of each plant that was converted."""
+    return "\n\n".join(_block(outcome, dry_run) for outcome in outcomes if not outcome.error)
+
+
+def _block(outcome: Outcome, dry_run: bool) -> str:
+    shown = [{k: v for k, v in row.items() if k != "seconds"} for row in outcome.levels]
+    rows = [[_cell(v) for v in row.values()] for row in shown]
+    head = [name.replace("_", " ") for name in shown[0]]
+    total = human_bytes(sum(outcome.files.values()))
+    title = f"{outcome.job.name}: {outcome.seconds:.1f} s, {total}"
+    title += " would be written" if dry_run else ""
+    files = [f"  {path}  {human_bytes(size)}" for path, size in outcome.files.items()]
+    return "\n".join([title, table(head, rows), *files])
+
+
+def _cell(value: Any) -> str:
+    """A figure as a person reads it; what there is none of is empty."""
+    if value is None:
+        return ""
+    return f"{value:,}" if isinstance(value, int) else str(value)
