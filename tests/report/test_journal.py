@@ -65,3 +65,16 @@ def test_nothing_is_left_where_nothing_was_finished(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt), Journal(tmp_path / "new" / "folder", "key"):
         raise KeyboardInterrupt
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a file that is always full")
+def test_a_full_disk_is_told_with_the_file_and_keeps_what_there_was(tmp_path: Path) -> None:
+    with Journal(tmp_path, "key") as journal:
+        journal.add("oak", "live", {"row": 1})
+    with pytest.raises(OutputError, match=NAME), Journal(tmp_path, "key") as journal:
+        journal._file.close()
+        journal._file = Path("/dev/full").open("w", encoding="utf-8")  # noqa: SIM115
+        journal.add("oak", "kmeans 16", {"row": 2})
+    with Journal(tmp_path, "key") as journal:
+        assert journal.get("oak", "live") == {"row": 1}
+        assert journal.get("oak", "kmeans 16") is None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -275,6 +276,16 @@ def test_stability_is_told_and_written(
     assert run(["report", "--stability", "--json"]) == code
     assert json.loads(capsys.readouterr().out)[0]["passed"] == passed
     assert run(["report", "--stability", "-o", str(tmp_path)]) == 1, "it stands there already"
+
+
+def test_nothing_is_said_but_the_error_where_matplotlib_cannot_keep_its_cache(
+    tmp_path: Path,
+) -> None:
+    home = {**os.environ, "MPLCONFIGDIR": str(Path(__file__) / "no_folder")}
+    command = [sys.executable, "-m", "vegtool", "report", "no.glb", "-q", "-o", str(tmp_path / "o")]
+    done = subprocess.run(command, capture_output=True, text=True, env=home)
+    assert done.returncode == 1
+    assert done.stderr.count("\n") == 1
 
 
 def test_without_matplotlib_it_ends_at_once(model: Path, tmp_path: Path) -> None:

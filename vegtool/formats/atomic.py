@@ -50,7 +50,7 @@ class FileSet:
 
     def __enter__(self) -> Self:
         try:
-            with _explained(self._folder):
+            with explained(self._folder):
                 self._new.mkdir(parents=True)
                 self._old.mkdir()
         except BaseException:
@@ -63,7 +63,7 @@ class FileSet:
         if Path(name).name != name:
             raise ValueError(f"FileSet.add: {name!r} is no plain file name")
         check_free(self._folder, [name], self._force, self._inputs)
-        with _explained(self._folder / name):
+        with explained(self._folder / name):
             (self._new / name).write_bytes(data)
         self._names.append(name)
 
@@ -83,7 +83,7 @@ class FileSet:
             there = {p.name for p in self.paths if os.path.lexists(p)}
             self._first_there = [name for name in self._names if name not in there]
             for path in self.paths:
-                with _explained(path):
+                with explained(path):
                     if path.name in there:
                         path.replace(self._old / path.name)
                     (self._new / path.name).replace(path)
@@ -138,7 +138,7 @@ def check_free(
 def _check_folder(folder: Path) -> None:
     """Raise OutputError where the folder is not there and cannot be made, or not be written."""
     there = next((p for p in (folder, *folder.parents) if os.path.lexists(p)), folder)
-    with _explained(folder):
+    with explained(folder):
         if not there.is_dir():
             raise NotADirectoryError(ENOTDIR, os.strerror(ENOTDIR))
         if not os.access(there, os.W_OK | os.X_OK):
@@ -157,8 +157,8 @@ def _same(path: Path, other: Path) -> bool:
 
 
 @contextmanager
-def _explained(path: Path) -> Iterator[None]:
-    """Turn the operating system's refusals into sentences."""
+def explained(path: Path) -> Iterator[None]:
+    """Turn the operating system's refusals to write there into OutputErrors."""
     try:
         yield
     except OSError as error:

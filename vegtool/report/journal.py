@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from vegtool.errors import OutputError
+from vegtool.formats.atomic import explained
 
 NAME = "report.unfinished.jsonl"
 
@@ -22,7 +23,7 @@ class Journal:
     Nothing is kept of a report that finished nothing, not even the folders made for it.
 
     key: a digest of what shapes every row: options and version. `force` begins anew where the
-    folder holds a journal of another key; else OutputError says so.
+    folder holds a journal of another key; else OutputError says so, as it does of a full disk.
     """
 
     def __init__(self, folder: Path, key: str, force: bool = False) -> None:
@@ -30,21 +31,23 @@ class Journal:
         self._done: dict[tuple[str, str], Any] = {}
         kept = self._read(key, force)
         self._missing_folders = [p for p in (folder, *folder.parents) if not p.exists()]
-        folder.mkdir(parents=True, exist_ok=True)
-        whole = self._path.with_suffix(".new")
-        self._file = whole.open("w", encoding="utf-8")
-        self._write({"report": key})
-        for (plant, piece), value in kept.items():
-            self.add(plant, piece, value)
-        self._file.close()
-        whole.replace(self._path)
-        self._file = self._path.open("a", encoding="utf-8")
+        with explained(self._path):
+            folder.mkdir(parents=True, exist_ok=True)
+            whole = self._path.with_suffix(".new")
+            self._file = whole.open("w", encoding="utf-8")
+            self._write({"report": key})
+            for (plant, piece), value in kept.items():
+                self.add(plant, piece, value)
+            self._file.close()
+            whole.replace(self._path)
+            self._file = self._path.open("a", encoding="utf-8")
 
     def __enter__(self) -> Journal:
         return self
 
     def __exit__(self, *error: object) -> None:
-        self._file.close()
+        with explained(self._path):
+            self._file.close()
         if self._done:
             return
         self._path.unlink(missing_ok=True)
@@ -59,7 +62,8 @@ class Journal:
     def add(self, plant: str, piece: str, value: Any) -> None:
         """Write a finished piece of work, through to the disk."""
         self._done[plant, piece] = value
-        self._write({"plant": plant, "piece": piece, "value": value})
+        with explained(self._path):
+            self._write({"plant": plant, "piece": piece, "value": value})
 
     def remove(self) -> None:
         """The report is whole: nothing is left to go on with."""
