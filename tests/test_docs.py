@@ -9,6 +9,7 @@ import pytest
 import typer
 
 from vegtool.cli import app
+from vegtool.measure.metrics import METRICS
 
 ROOT = Path(__file__).parent.parent
 COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
@@ -32,3 +33,22 @@ def test_links_lead_somewhere(page: Path) -> None:
     for target in re.findall(r"\]\(([^)#]+)", page.read_text(encoding="utf-8")):
         if not target.startswith(("http", "mailto")):
             assert (page.parent / target).exists(), f"{page.name} links to {target}"
+
+
+def test_each_metric_is_defined_on_its_page() -> None:
+    page = (ROOT / "docs" / "metrics.md").read_text(encoding="utf-8")
+    assert re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE) == list(METRICS)
+
+
+def test_each_benchmark_is_listed() -> None:
+    page = (ROOT / "docs" / "benchmarks.md").read_text(encoding="utf-8")
+    there = {path.name for path in ROOT.glob("benchmarks/*.py")} - {"recorded.py"}
+    assert set(re.findall(r"`python benchmarks/(\w+\.py)", page)) == there
+
+
+def test_each_room_is_on_the_map() -> None:
+    page = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    rooms = {path.name for path in (ROOT / "vegtool").iterdir() if path.suffix == ".py"}
+    rooms |= {f"{path.parent.name}/" for path in ROOT.glob("vegtool/*/__init__.py")}
+    named = set(re.findall(r"`([a-z]+(?:\.py|/))`", page))
+    assert {room for room in rooms if not room.startswith("__")} - named == set()

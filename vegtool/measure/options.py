@@ -25,7 +25,7 @@ class MeasureOptions:
     max_error: float | None = option(
         None,
         "Greatest FLIP error (mean over views) of a level where it is used; by default that of the "
-        "original as a client draws it there.",
+        "original as a client draws it there, or 0.1 where that is less.",
         least=0.0,
         most=1.0,
         metavar="FLIP",
