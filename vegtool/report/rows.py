@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 
 from vegtool.arrays import FloatArray
+from vegtool.baselines import BASELINES
 from vegtool.lod import Spread
 from vegtool.measure.cost import Cost, FrameTime
 from vegtool.measure.scores import spread
 
 LIVE = "live"
 """Name of the original as a client draws it: the line to beat."""
-EMULATED = ("octahedral",)
+EMULATED = tuple(name for name, maker in BASELINES.items() if maker.emulated)
 """Families that no stock client draws: for orientation, and on no Pareto front."""
 TRUTH = "truth"
 """What pictures of the original as it is are called."""
