@@ -1,7 +1,7 @@
 """What others do, to be measured beside ours: mesh reduction, crossed billboards, impostors.
 
-A baseline is one line in `BASELINES`: where it is made, whether it is made for a number of triangles,
-and whether it is emulated.
+A baseline is one line in `BASELINES`: where it is made, whether it is made for a number of
+triangles, and whether it is emulated.
 """
 
 from __future__ import annotations
