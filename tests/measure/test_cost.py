@@ -87,14 +87,15 @@ def held(count: int) -> None:
 
 @linux
 def test_the_peak_of_a_block_is_its_own() -> None:
-    """Megabytes let go before it do not count; those held within it for a while do."""
+    """Megabytes let go before it do not count; those held within it for a while do. A fifth is room
+    for what other threads, and the system, do with the process meanwhile."""
     held(100 * MB)
     with peak_memory() as idle:
         pass
     with peak_memory() as peak:
         held(100 * MB)
     assert idle.mb is not None and peak.mb is not None
-    assert peak.mb - idle.mb == pytest.approx(100, abs=5)
+    assert peak.mb - idle.mb == pytest.approx(100, rel=0.2)
 
 
 @linux

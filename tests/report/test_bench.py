@@ -69,7 +69,7 @@ def test_the_row_is_what_measuring_by_hand_gives(
 
 
 def test_bounds_are_of_billboards_and_fall_with_distance(made: dict[str, tuple[Row, Any]]) -> None:
-    """Ten times as far, a tenth of the pixels; e_p is never more than what bounds it."""
+    """The farther the smaller; e_p is never more than what bounds it."""
     row, _ = made["kmeans 30"]
     projection, bound = np.array(row.projection_px), np.array(row.bound_px)
     assert (np.diff(projection) < 0).all()
