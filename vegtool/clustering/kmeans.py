@@ -37,17 +37,18 @@ def kmeans(
     """(f,) int32 labels of at most `count` compact clusters."""
     fine = samples(plant, options.orientation_scale(count), count)
     few = coarse(fine, count)
-    labels = settle(few, np.zeros(len(few.points), dtype=np.int64), count)
+    labels = settle(few, count)
     if few is not fine:
         exact = nearest(fine.points, means(few.points, few.weights, labels)[0])
         labels = fill(fine.points, fine.weights, compacted(exact), count)
     return np.asarray(labels[fine.of_face], dtype=np.int32)
 
 
-def settle(few: Samples, labels: Labels, count: int, group: Labels | None = None) -> Labels:
-    """Split, merge and move until `count` clusters have little error, each within its group."""
+def settle(few: Samples, count: int) -> Labels:
+    """Split, merge and move until `count` clusters have little error."""
     points, weights = few.points, few.weights
+    labels = np.zeros(len(points), dtype=np.int64)
     labels = split(points, weights, labels, min(OVERSHOOT * count, len(points)))
-    labels = lloyd(points, weights, labels, 2, count, group)
-    labels = merge(points, weights, labels, count, group)
-    return lloyd(points, weights, labels, rounds_for(count, ROUNDS), count, group)
+    labels = lloyd(points, weights, labels, 2, count)
+    labels = merge(points, weights, labels, count)
+    return lloyd(points, weights, labels, rounds_for(count, ROUNDS), count)

@@ -28,8 +28,6 @@ from vegtool.clustering.partition import (
     fill,
     means,
     pairs_per_round,
-    reach_of,
-    set_apart,
     split,
 )
 from vegtool.progress import Progress, silent
@@ -153,6 +151,16 @@ def neighbours(center: FloatArray, of_cluster: Labels | None, reach: float) -> L
         return near
     own = np.arange(len(center))[:, None]
     return np.where(of_cluster[near] == of_cluster[own], near, own)
+
+
+def set_apart(points: FloatArray, group: Labels, reach: float) -> FloatArray:
+    """Points with one more coordinate, which keeps groups at least `reach` apart."""
+    return np.concatenate([points, reach * group[:, None]], axis=1)
+
+
+def reach_of(points: FloatArray) -> float:
+    """More than the distance between any two points, or their means."""
+    return 4.0 * (1.0 + float(np.linalg.norm(points, axis=1).max()))
 
 
 def move(

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from vegtool.arrays import FloatArray
-from vegtool.clustering.features import Labels, spread_to
+from vegtool.clustering.features import Labels
 
 NEIGHBOURS = 8  # means next to a mean that it may merge with
 MANY = 4096  # clusters: beyond, each has few points, and two rounds of anything are enough
@@ -71,32 +71,19 @@ def cut(
     return compacted(np.where(side & (new[labels] >= 0), new[labels], labels))
 
 
-def merge(
-    points: FloatArray,
-    weights: FloatArray,
-    labels: Labels,
-    count: int,
-    group: Labels | None = None,
-) -> Labels:
+def merge(points: FloatArray, weights: FloatArray, labels: Labels, count: int) -> Labels:
     """Merge until there are `count` clusters: the neighbours that add the least error first.
 
     A round merges disjoint pairs (`pairs_per_round`) and then looks again.
-    group: (n,) clusters merge only within their group; `count` is at least the groups'.
     """
     from scipy.spatial import cKDTree
 
     k = int(labels.max()) + 1
     while k > count:
         center, mass = means(points, weights, labels)
-        of_cluster = None if group is None else spread_to(labels, group)
-        if of_cluster is not None:
-            center = set_apart(center, of_cluster, reach_of(points))
         distance, near = cKDTree(center).query(center, k=min(NEIGHBOURS + 1, k))
         a = np.repeat(np.arange(k), near.shape[1])  # itself too, which disjoint_pairs skips
         b, squared = near.ravel(), distance.ravel() ** 2
-        if of_cluster is not None:
-            within = of_cluster[a] == of_cluster[b]
-            a, b, squared = a[within], b[within], squared[within]
         added = squared * mass[a] * mass[b] / (mass[a] + mass[b])
         order = np.argsort(added, kind="stable")
         into = disjoint_pairs(a[order], b[order], k, limit=pairs_per_round(k, count))
@@ -132,27 +119,15 @@ def disjoint_pairs(a: Labels, b: Labels, k: int, limit: int) -> Labels:
 
 
 def lloyd(
-    points: FloatArray,
-    weights: FloatArray,
-    labels: Labels,
-    rounds: int,
-    count: int,
-    group: Labels | None = None,
+    points: FloatArray, weights: FloatArray, labels: Labels, rounds: int, count: int
 ) -> Labels:
     """Move every point to the nearest mean, `rounds` times or until nothing moves.
 
     Clusters that run empty are filled again, so that `count` remain.
-    group: (n,) points move only between the clusters of their group.
     """
     for _ in range(rounds):
         center, _ = means(points, weights, labels)
-        if group is None:
-            moved = nearest(points, center)
-        else:
-            of_cluster = spread_to(labels, group)
-            reach = reach_of(points)
-            moved = nearest(set_apart(points, group, reach), set_apart(center, of_cluster, reach))
-        moved = fill(points, weights, compacted(moved), count)
+        moved = fill(points, weights, compacted(nearest(points, center)), count)
         if np.array_equal(moved, labels):
             break
         labels = moved
@@ -164,16 +139,6 @@ def nearest(points: FloatArray, center: FloatArray) -> Labels:
     from scipy.spatial import cKDTree
 
     return np.asarray(cKDTree(center).query(points)[1])
-
-
-def set_apart(points: FloatArray, group: Labels, reach: float) -> FloatArray:
-    """Points with one more coordinate, which keeps groups at least `reach` apart."""
-    return np.concatenate([points, reach * group[:, None]], axis=1)
-
-
-def reach_of(points: FloatArray) -> float:
-    """More than the distance between any two points, or their means."""
-    return 4.0 * (1.0 + float(np.linalg.norm(points, axis=1).max()))
 
 
 def fill(points: FloatArray, weights: FloatArray, labels: Labels, count: int) -> Labels:
