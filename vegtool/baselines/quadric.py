@@ -48,7 +48,7 @@ class Collapsed:
     vertex: IntArray
 
 
-def quadric(plant: Plant, triangles: int, seed: int = 0) -> Level:
+def quadric(plant: Plant, triangles: int) -> Level:
     """The plant as a mesh of at most that many triangles, where its pieces allow it.
 
     They are shared among the materials in proportion to their faces. Each keeps one piece at least,
@@ -63,7 +63,7 @@ def quadric(plant: Plant, triangles: int, seed: int = 0) -> Level:
             continue
         if plant.materials[material].role == "leaf":
             with timed(seconds, "thin"):
-                surface = thinned(surface, share, seed)
+                surface = thinned(surface, share)
         with timed(seconds, "collapse"):
             reduced.append((material, collapsed(surface, share)))
     with timed(seconds, "assemble"):

@@ -22,7 +22,7 @@ LEAF_FACES = 2
 """Triangles that a leaf is left with where there are not enough for all as they are."""
 
 
-def thinned(surface: Surface, target: int, seed: int) -> Surface:
+def thinned(surface: Surface, target: int) -> Surface:
     """A random choice of the surface's pieces, enlarged about their middles.
 
     As many as `target` triangles allow, two to a piece: whole cards of two are left with no more
@@ -35,7 +35,7 @@ def thinned(surface: Surface, target: int, seed: int) -> Surface:
     if kept >= count:
         return surface
     chosen = np.zeros(count, bool)
-    chosen[generator(seed, "thinning").permutation(count)[:kept]] = True
+    chosen[generator(0, "thinning").permutation(count)[:kept]] = True
     shown = chosen[piece]
     part = surface.of(shown)
     areas = surface.areas

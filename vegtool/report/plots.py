@@ -27,6 +27,8 @@ from vegtool.report.labels import LEFT, Labels, Line
 from vegtool.report.rows import EMULATED, LIVE
 from vegtool.report.summary import Point, families, pareto
 
+ERROR = "flip"
+"""The metric that is plotted."""
 SIZES = (200.0, 50.0)
 """Pixels: one panel each."""
 INK, FAINT, LINE, PAPER = "#1f2429", "#626a71", "#d5d9dc", "#ffffff"
@@ -92,10 +94,8 @@ COST_AXES = (
 )
 
 
-def error_against(
-    points: Sequence[Point], cost: CostAxis, title: str, metric: str = "flip"
-) -> Figure:
-    """A panel per size: the metric's mean against a cost."""
+def error_against(points: Sequence[Point], cost: CostAxis, title: str) -> Figure:
+    """A panel per size: the mean error against a cost."""
     sizes = [s for s in SIZES if any(s in p.pixels for p in points)] or [points[0].pixels[0]]
     with rc_context(STYLE):
         figure = Figure(figsize=(4.9 * len(sizes), 4.1), layout="constrained")
@@ -104,11 +104,11 @@ def error_against(
             _axis(axes, cost, [getattr(p, cost.name) for p in points])
             axes.set_title(f"{size:g} pixels high")
         drawn = [
-            _panel(axes, [p for p in points if size in p.pixels], cost, metric, size)
+            _panel(axes, [p for p in points if size in p.pixels], cost, size)
             for axes, size in zip(panels, sizes, strict=True)
         ]
         panels[0].set_ylim(bottom=0)
-        panels[0].set_ylabel(_error_label(points, metric))
+        panels[0].set_ylabel(_error_label(points))
         _framed(figure, title, "band: Pareto front, with budgets; dashed: the original, live; "
                 "whiskers: standard deviation")  # fmt: skip
         for axes, lines in zip(panels, drawn, strict=True):
@@ -125,9 +125,9 @@ class _Lines:
     others: list[Line]
 
 
-def _panel(axes: Axes, points: list[Point], cost: CostAxis, metric: str, size: float) -> _Lines:
+def _panel(axes: Axes, points: list[Point], cost: CostAxis, size: float) -> _Lines:
     """Draw a panel. What costs nothing has no place on its axis."""
-    errors = {p.name: p.errors[metric][p.pixels.index(size)] for p in points}
+    errors = {p.name: p.errors[ERROR][p.pixels.index(size)] for p in points}
     at = {p.name: (float(getattr(p, cost.name)), errors[p.name].mean) for p in points}
     placed = [p for p in points if at[p.name][0] > 0]
     own_lines: dict[str, Line] = {}
@@ -176,7 +176,7 @@ def _axis(axes: Axes, cost: CostAxis, values: list[float]) -> None:
     axes.xaxis.set_minor_formatter(NullFormatter())
 
 
-def error_against_distance(points: Sequence[Point], title: str, metric: str = "flip") -> Figure:
+def error_against_distance(points: Sequence[Point], title: str) -> Figure:
     """Every row's error at each size, from near to far; a panel per family with its budgets."""
     shown = [f for f in families(points) if f != LIVE]
     columns = min(4, len(shown)) or 1
@@ -192,12 +192,12 @@ def error_against_distance(points: Sequence[Point], title: str, metric: str = "f
             axes.set_xticks(ticks, [f"{t:g}" for t in ticks])
             axes.minorticks_off()
             axes.yaxis.set_major_locator(MaxNLocator(5))
-            drawn.append(_distance_panel(axes, points, family, metric))
+            drawn.append(_distance_panel(axes, points, family))
         panels[0, 0].set_xlim(ticks[-1] * 2.2, ticks[0] / 1.25)  # near to far
         panels[0, 0].set_ylim(bottom=0)
         for axes in panels.flat[len(shown) :]:
             axes.set_visible(False)
-        figure.supylabel(_error_label(points, metric), fontsize=9, color=FAINT)
+        figure.supylabel(_error_label(points), fontsize=9, color=FAINT)
         _framed(figure, title, "height on the screen, pixels, from near to far; numbers: budgets; "
                 "dashed: the original, live; band: the least of all")  # fmt: skip
         for axes, lines in zip(panels.flat, drawn, strict=False):
@@ -209,14 +209,14 @@ def error_against_distance(points: Sequence[Point], title: str, metric: str = "f
 
 
 def _distance_panel(
-    axes: Axes, points: Sequence[Point], family: str, metric: str
+    axes: Axes, points: Sequence[Point], family: str
 ) -> list[tuple[int | None, Line]]:
     """Draw a family's rows over the live original's; their budgets and lines, near points first."""
     color, marker = look(family, families(points))
     lines = []
-    axes.plot(*_least(points, metric).T, color=LINE, linewidth=7, solid_capstyle="round", zorder=1)
+    axes.plot(*_least(points).T, color=LINE, linewidth=7, solid_capstyle="round", zorder=1)
     for point in points:
-        line = np.array([point.pixels, [e.mean for e in point.errors[metric]]]).T
+        line = np.array([point.pixels, [e.mean for e in point.errors[ERROR]]]).T
         if point.family == LIVE:
             axes.plot(*line.T, color=INK, linewidth=1, linestyle=DASHED, zorder=2)
         elif point.family == family:
@@ -226,11 +226,11 @@ def _distance_panel(
     return lines
 
 
-def _least(points: Sequence[Point], metric: str) -> Line:
+def _least(points: Sequence[Point]) -> Line:
     """The least error of all rows that a client can draw, at each size that they share."""
     for_clients = [p for p in points if p.family not in EMULATED]
     sizes = sorted(set.intersection(*(set(p.pixels) for p in for_clients)))
-    of = [[p.errors[metric][p.pixels.index(s)].mean for p in for_clients] for s in sizes]
+    of = [[p.errors[ERROR][p.pixels.index(s)].mean for p in for_clients] for s in sizes]
     return np.array([sizes, [min(errors) for errors in of]]).T
 
 
@@ -284,9 +284,9 @@ def png(figure: Figure) -> bytes:
     return stream.getvalue()
 
 
-def _error_label(points: Sequence[Point], metric: str) -> str:
+def _error_label(points: Sequence[Point]) -> str:
     several = points[0].plants > 1
-    return f"{METRICS[metric]}, " + ("median over plants" if several else "mean over views")
+    return f"{METRICS[ERROR]}, " + ("median over plants" if several else "mean over views")
 
 
 def _short(value: float) -> str:

@@ -103,18 +103,14 @@ def relative(value: float, truth: float) -> float:
     return abs(value - truth) / (abs(truth) or 1.0)
 
 
-def exact(
-    error: float, offset_over_size: float = 0.0, iterations: int | None = None, note: str = ""
-) -> Outcome:
+def exact(error: float, offset_over_size: float = 0.0, note: str = "") -> Outcome:
     """The outcome of a case whose right answer is known; `offset_over_size` as in `widened`."""
-    return widened(error, EXACT, "the exact answer", offset_over_size, iterations, note)
+    return widened(error, EXACT, "the exact answer", offset_over_size, note)
 
 
-def same_objective(
-    error: float, offset_over_size: float = 0.0, iterations: int | None = None, note: str = ""
-) -> Outcome:
+def same_objective(error: float, offset_over_size: float = 0.0, note: str = "") -> Outcome:
     """The outcome of a case that compares objectives; `offset_over_size` as in `widened`."""
-    return widened(error, OBJECTIVE, "the same objective", offset_over_size, iterations, note)
+    return widened(error, OBJECTIVE, "the same objective", offset_over_size, note)
 
 
 def drawn(error: float, plant_over_picture: float = 1.0, note: str = "") -> Outcome:
@@ -128,12 +124,7 @@ def drawn(error: float, plant_over_picture: float = 1.0, note: str = "") -> Outc
 
 
 def widened(
-    error: float,
-    tolerance: float,
-    reason: str,
-    offset_over_size: float,
-    iterations: int | None,
-    note: str,
+    error: float, tolerance: float, reason: str, offset_over_size: float, note: str
 ) -> Outcome:
     """An outcome with the tolerance that rounding allows.
 
@@ -143,7 +134,7 @@ def widened(
     rounding = ROUNDINGS * float(np.finfo(np.float64).eps) * offset_over_size
     if rounding > tolerance:
         reason = f"{ROUNDINGS:.0f} roundings at {offset_over_size:.1e} sizes from the origin"
-    return Outcome(error, max(tolerance, rounding), reason, iterations, note)
+    return Outcome(error, max(tolerance, rounding), reason, note=note)
 
 
 def holds(violations: int, what: str, iterations: int | None = None, note: str = "") -> Outcome:

@@ -20,7 +20,7 @@ from vegtool.clustering.features import coarse, samples
 from vegtool.clustering.lines import lines, merge_collinear, move, split_wide
 from vegtool.clustering.partition import error, lloyd, split
 from vegtool.seeding import generator
-from vegtool.stability.case import Case, Outcome, exact, holds, widened
+from vegtool.stability.case import Case, Outcome, exact, holds
 from vegtool.stability.clustering import duplicates
 from vegtool.stability.plants import rotation, soup, tree
 
@@ -205,7 +205,7 @@ def coverage_search(alpha: FloatArray) -> Outcome:
     found = miss(int(thresholds(blocks, 1)[0]))
     best = min(miss(t) for t in range(1, 256))
     note = f"misses {found:.2f} of {wanted:.2f} texels; the test alone {miss(PASS):.2f}"
-    return widened((found - best) / 64, 1e-9, "the best of 255 thresholds", 0.0, 8, note)
+    return Outcome((found - best) / 64, 1e-9, "the best of 255 thresholds", 8, note)
 
 
 SEARCHES: tuple[tuple[Shape, str], ...] = (

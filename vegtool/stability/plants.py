@@ -78,7 +78,7 @@ def tree() -> Plant:
     return sample("broadleaf", 6000)
 
 
-def soup(corners: npt.ArrayLike, double_sided: bool = True) -> Plant:
+def soup(corners: npt.ArrayLike) -> Plant:
     """A plant of bare triangles (f, 3, 3), metres: leaves without a texture."""
     positions = np.asarray(corners, dtype=np.float64).reshape(-1, 3)
     count = len(positions)
@@ -89,7 +89,7 @@ def soup(corners: npt.ArrayLike, double_sided: bool = True) -> Plant:
         np.zeros((count, 2)),
         np.arange(count, dtype=np.int32).reshape(-1, 3),
         np.zeros(count // 3, dtype=np.int32),
-        (Material("leaf", role="leaf", double_sided=double_sided),),
+        (Material("leaf", role="leaf", double_sided=True),),
     )
 
 
