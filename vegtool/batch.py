@@ -5,6 +5,7 @@ One bad file does not stop the others, and each file's outputs appear whole or n
 
 from __future__ import annotations
 
+import os
 import re
 import signal
 import threading
@@ -188,10 +189,21 @@ _stop: Event | None = None
 
 
 def _in_worker(stop: Event) -> None:
-    """What a worker does first: leave Ctrl-C to the process that started it."""
+    """What a worker does first: leave Ctrl-C to the process that started it, and end with it."""
     global _stop
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _stop = stop
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """Not to wait without end for work from a process that was killed."""
+    from multiprocessing import parent_process
+
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def _or_stop(stage: str, fraction: float) -> None:
