@@ -54,6 +54,17 @@ def test_a_file_that_is_no_journal_is_refused(tmp_path: Path, content: bytes) ->
         Journal(tmp_path, "key")
 
 
+@pytest.mark.parametrize("line", ['{"plant": [1], "piece": "live", "value": {}}', "[]", "{}"])
+def test_a_damaged_line_is_as_if_never_written(tmp_path: Path, line: str) -> None:
+    with Journal(tmp_path, "key") as journal:
+        journal.add("oak", "live", {"row": 1})
+    with (tmp_path / NAME).open("a") as file:
+        file.write(line + "\n" + '{"plant": "oak", "piece": "kmeans 16", "value": 5}\n')
+    with Journal(tmp_path, "key") as journal:
+        assert journal.get("oak", "live") == {"row": 1}
+        assert journal.get("oak", "kmeans 16") is None
+
+
 def test_nothing_is_left_of_a_whole_report(tmp_path: Path) -> None:
     with Journal(tmp_path, "key") as journal:
         journal.add("oak", "live", {"row": 1})

@@ -89,8 +89,13 @@ class Journal:
         return {
             (line["plant"], line["piece"]): line["value"]
             for line in lines[1:]
-            if line is not None and {"plant", "piece", "value"} <= set(line)
+            if line is not None and _is_piece(line)
         }
+
+
+def _is_piece(line: dict[str, Any]) -> bool:
+    kinds = {"plant": str, "piece": str, "value": dict}
+    return all(isinstance(line.get(name), kind) for name, kind in kinds.items())
 
 
 def _parsed(line: bytes) -> dict[str, Any] | None:
