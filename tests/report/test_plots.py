@@ -101,3 +101,11 @@ def test_words_that_have_no_room_are_left_out() -> None:
     labels = Labels(axes, [everywhere])
     labels.write_if_free("1024", np.array([[0.5, 0.5]]), 8.0, "black")
     assert not axes.texts
+
+
+def test_the_axis_of_a_single_row_of_panels_has_room_for_its_words() -> None:
+    figure = error_against_distance(POINTS, "title")
+    words = figure._supylabel.get_window_extent()  # type: ignore[attr-defined]
+    title = figure._suptitle.get_window_extent()  # type: ignore[attr-defined]
+    assert words.y0 >= 0
+    assert words.y1 <= title.y0

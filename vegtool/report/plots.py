@@ -183,7 +183,7 @@ def error_against_distance(points: Sequence[Point], title: str) -> Figure:
     rows = -(-len(shown) // columns) or 1
     ticks = sorted({size for point in points for size in point.pixels})
     with rc_context(STYLE):
-        figure = Figure(figsize=(2.45 * columns, 2.4 * rows + 0.5), layout="constrained")
+        figure = Figure(figsize=(2.45 * columns, max(2.4 * rows + 0.5, 4.3)), layout="constrained")
         panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
         drawn = []
         for axes, family in zip(panels.flat, shown, strict=False):
