@@ -70,7 +70,7 @@ def manifest(chain: LodChain, files: Sequence[LevelFile]) -> dict[str, Any]:
 
 def _level(chain: LodChain, level: Level, file: LevelFile) -> dict[str, Any]:
     distance = level.near_distance_m
-    fade = FADE_FRACTION * distance
+    fade = float(f"{FADE_FRACTION * distance:.6g}")
     error = level.geometric_error_m
     return {
         "file": file.name,
@@ -81,7 +81,7 @@ def _level(chain: LodChain, level: Level, file: LevelFile) -> dict[str, Any]:
         "bytes": file.bytes,
         "switch_distance_m": distance,
         "fade_start_m": distance,
-        "fade_end_m": distance + fade,
+        "fade_end_m": float(f"{distance + fade:.6g}"),
         "hysteresis_m": fade,
         "screen_height_fraction": screen_height_fraction(chain, distance) if distance else None,
         "geometric_error_m": None if error is None else {"max": error[0], "p95": error[1]},
