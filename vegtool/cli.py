@@ -197,6 +197,7 @@ def report_command(
             if (out / JOURNAL).exists():
                 console.say("rows that are finished are kept: the same command goes on from there")
             raise
+    from vegtool.report.run import misses
     from vegtool.report.text import as_summary, summary_text  # draws, which may not be possible
 
     for plant in found.plants:
@@ -212,6 +213,8 @@ def report_command(
         kind = BatchError if found.plants else VegtoolError
         names = ", ".join(str(sources[name]) for name in found.failed)
         raise kind(f"{len(found.failed)} of {len(sources)} plants failed: {names}")
+    if missed := misses(found):
+        raise QualityError("; ".join(missed))
 
 
 def _report_stability(console: Console, out: Path | None, force: bool, plants: bool) -> None:

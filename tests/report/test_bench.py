@@ -22,8 +22,8 @@ from vegtool.report.bench import Bench, measured, set_up
 from vegtool.report.entries import Entry, entries
 from vegtool.report.options import ReportOptions
 from vegtool.report.pictures import SIZES, of_truth, sizes_of
-from vegtool.report.rows import Row
-from vegtool.report.run import _Clock, _digest, _with_distances
+from vegtool.report.rows import PlantReport, Report, Row
+from vegtool.report.run import _Clock, _digest, _with_distances, misses
 
 pytestmark = pytest.mark.gl
 OPTIONS = ReportOptions(methods="kmeans", budgets="4,30", view_count=2)
@@ -145,6 +145,34 @@ def test_coarse_texels_and_displacement_move_distances_away(
     found = _with_distances([*bounded, impostor], limited)
     assert found[1].switch_distance_m == pytest.approx(40.0, rel=0.01)
     assert found[3].why_not == "how far it displaces things is not known"
+
+
+def test_a_limit_is_checked_from_views_that_distances_were_not_chosen_by(
+    plant: Plant, made: dict[str, tuple[Row, Any]]
+) -> None:
+    """Other views err by 0.15 where the row starts, halfway between 0.1 and 0.2 at two sizes."""
+    row = made["kmeans 30"][0]
+    near, far = row.distance_m[:2]
+    at = replace(row, held_out=(0.1, 0.2, 0, 0, 0), switch_distance_m=float(np.sqrt(near * far)))
+    nowhere = replace(at, switch_distance_m=None)
+    about = PlantReport("bush", "bush.glb", 500, plant.extent, (), (at, nowhere))
+    found = {
+        limit: misses(Report((about,), {"max_error": limit}, "", "")) for limit in (0.12, 0.14)
+    }
+    assert not found[0.14], "0.15 is within 0.02 of it"
+    (sentence,) = found[0.12]
+    assert "bush: kmeans 30 from" in sentence
+    assert "found 0.150: 0.030 more" in sentence
+
+
+def test_other_views_are_measured_where_a_limit_is_to_be_checked(plant: Plant) -> None:
+    """Of a level that is the original itself, they err as little as the first ones do."""
+    options = replace(OPTIONS, max_error=0.2)
+    with PlantBuffers(plant) as buffers:
+        row, _ = measured(set_up(buffers, options), entry("live"), ())
+    assert len(row.held_out) == len(row.pixels)
+    assert row.held_out != tuple(row.mean("flip"))
+    np.testing.assert_allclose(row.held_out, row.mean("flip"), atol=0.05)
 
 
 def test_a_digest_is_of_what_can_be_seen(plant: Plant) -> None:

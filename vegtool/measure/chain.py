@@ -66,20 +66,24 @@ def with_distances(
 def misses(levels: Sequence[Level], options: MeasureOptions) -> list[str]:
     """A sentence on each level that exceeds `max_error` by more than HELD_OUT_MARGIN, from views
     and suns that were not used to choose its distance. levels: of a chain, with the original."""
-    found = []
-    for number, level in enumerate(levels):
-        held_out = level.measured.held_out if level.measured else None
-        if options.max_error is None or held_out is None:
-            continue
-        over = held_out.mean - options.max_error
-        if over > HELD_OUT_MARGIN:
-            found.append(
-                f"LOD{number} from {level.near_distance_m:g} m on: expected an error of at most "
-                f"{options.max_error:g} (FLIP, within {HELD_OUT_MARGIN:g}) from other views and "
-                f"suns than its distance was chosen by, found {held_out.mean:.3f}: "
-                f"{over:.3f} more"
-            )
-    return found
+    found = [
+        miss(f"LOD{number}", level.near_distance_m, options.max_error, level.measured.held_out.mean)
+        for number, level in enumerate(levels)
+        if options.max_error is not None and level.measured and level.measured.held_out
+    ]
+    return [sentence for sentence in found if sentence]
+
+
+def miss(what: str, from_m: float, limit: float, held_out: float) -> str:
+    """The sentence on an error from views and suns that a distance was not chosen by, where it is
+    above the limit by more than HELD_OUT_MARGIN; else nothing."""
+    if not held_out - limit > HELD_OUT_MARGIN:
+        return ""
+    return (
+        f"{what} from {from_m:g} m on: expected an error of at most {limit:g} (FLIP, within "
+        f"{HELD_OUT_MARGIN:g}) from other views and suns than its distance was chosen by, found "
+        f"{held_out:.3f}: {held_out - limit:.3f} more"
+    )
 
 
 class _Bench:

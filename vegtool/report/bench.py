@@ -18,6 +18,7 @@ from vegtool.measure.bounds import (
     projection_error,
     texel_error,
 )
+from vegtool.measure.chain import HELD_OUT_PHASE
 from vegtool.measure.cost import Cost, cost, peak_memory
 from vegtool.measure.scores import Truths, scores, truths
 from vegtool.measure.views import Camera, views
@@ -36,11 +37,13 @@ TOLERATED_PIXELS = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """buffers: the plant's, without mipmaps."""
+    """buffers: the plant's, without mipmaps. others: truths from other views under other suns, to
+    check --max-error with, where there is one."""
 
     buffers: PlantBuffers
     options: ReportOptions
     truths: Truths
+    others: Truths | None
     scene: Scene
 
     @property
@@ -51,11 +54,15 @@ class Bench:
 def set_up(buffers: PlantBuffers, options: ReportOptions, progress: Progress = silent) -> Bench:
     """Draw the truths of a plant. Raises CapabilityError where nothing can draw."""
     watched = scene(buffers, options.display)
-    shown_from = views(options.views, options.view_count)
-    drawn = truths(
-        buffers.plant, shown_from, display=options.display, progress=progress, buffers=buffers
-    )
-    return Bench(buffers, options, drawn, watched)
+
+    def drawn(phase: float) -> Truths:
+        shown_from = views(options.views, options.view_count, phase)
+        return truths(
+            buffers.plant, shown_from, display=options.display, progress=progress, buffers=buffers
+        )
+
+    others = None if options.max_error is None else drawn(HELD_OUT_PHASE)
+    return Bench(buffers, options, drawn(0.0), others, watched)
 
 
 def measured(
@@ -78,6 +85,9 @@ def measured(
         _floats(bench.truths.distance_m),
         {metric: tuple(_floats(v) for v in values) for metric, values in found.values.items()},
     )
+    if bench.others is not None:
+        others = scores(bench.others, made.shown)
+        row = replace(row, held_out=_floats(others.values["flip"].mean(axis=1)))
     if made.shown is level:
         row = _with_bounds(row, bench, level)
     return row, of_shown(made.shown, bench.scene, sizes)

@@ -33,9 +33,11 @@ class Row:
     name: unique within a plant. family: what is compared; budget: billboards asked for, or None.
     cost: what it takes to make, store and draw it. made_for_pixels: size on screen that its
     textures suit, or None. pixels, distance_m: (d,) sizes at which it was measured. values: by
-    metric, [d][v] over views. texels_per_metre: of its atlas, or 0. switch_distance_m: may be used
-    from here on; None where nowhere, and `why_not` says why. within_pixels_from_m: from here on it
-    displaces nothing by more than --max-pixels (1), by calculation; None where that is not known.
+    metric, [d][v] over views. held_out: (d,) mean FLIP from other views under other suns, where
+    --max-error is to be checked; else empty. texels_per_metre: of its atlas, or 0.
+    switch_distance_m: may be used from here on; None where nowhere, and `why_not` says why.
+    within_pixels_from_m: from here on it displaces nothing by more than --max-pixels (1), by
+    calculation; None where that is not known.
     projection_px, bound_px, texel_px: (d,) of its worst billboard by formula (measure/bounds.py):
     e_p, the most that anything is displaced, e_t; empty for a mesh.
     """
@@ -49,6 +51,7 @@ class Row:
     pixels: tuple[float, ...]
     distance_m: tuple[float, ...]
     values: Mapping[str, tuple[tuple[float, ...], ...]]
+    held_out: tuple[float, ...] = ()
     texels_per_metre: float = 0.0
     switch_distance_m: float | None = None
     why_not: str = ""

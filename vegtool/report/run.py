@@ -22,6 +22,7 @@ from vegtool import __version__
 from vegtool.errors import CapabilityError, VegtoolError
 from vegtool.formats import ReadOptions, read_plant
 from vegtool.gl.upload import PlantBuffers
+from vegtool.measure.chain import miss
 from vegtool.measure.distances import LeftOut, limits, switch_distances
 from vegtool.measure.pictures import check_drawing, renderer
 from vegtool.plant import Plant
@@ -174,6 +175,19 @@ def _with_distances(rows: Sequence[Row], options: ReportOptions) -> list[Row]:
         replace(row, switch_distance_m=0.0) if row is live else _starting(row, starts.get(row.name))
         for row in rows
     ]
+
+
+def misses(report: Report) -> list[str]:
+    """A sentence on each row that exceeds --max-error where it is said to be of use, from views and
+    suns that its distance was not chosen by."""
+    found = []
+    for plant in report.plants:
+        for row in (row for row in plant.rows if row.held_out and row.switch_distance_m):
+            start = row.switch_distance_m or 0.0
+            error = float(np.interp(np.log(start), np.log(row.distance_m), row.held_out))
+            name = f"{plant.name}: {row.name}"
+            found.append(miss(name, start, report.options["max_error"], error))
+    return [sentence for sentence in found if sentence]
 
 
 def _least_m(row: Row, options: ReportOptions) -> float | None:
