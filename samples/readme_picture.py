@@ -1,4 +1,4 @@
-"""Draws docs/broadleaf.jpg, the README's picture: the contact sheet of the broadleaf sample.
+"""Draws docs/conifer.jpg, the README's picture: the contact sheet of the conifer sample.
 
 .venv/bin/python samples/readme_picture.py
 """
@@ -14,11 +14,11 @@ from vegtool.convert import convert
 from vegtool.growth import sample
 from vegtool.measure.contact_sheet import contact_sheet
 
-PICTURE = Path(__file__).resolve().parent.parent / "docs" / "broadleaf.jpg"
+PICTURE = Path(__file__).resolve().parent.parent / "docs" / "conifer.jpg"
 
 
 def main() -> None:
-    sheet = Image.open(BytesIO(contact_sheet(convert(sample("broadleaf")))))
+    sheet = Image.open(BytesIO(contact_sheet(convert(sample("conifer")))))
     sheet.convert("RGB").save(PICTURE, quality=88, optimize=True)
 
 
