@@ -43,7 +43,7 @@ def curves(monkeypatch: pytest.MonkeyPatch) -> Curves:
 
     def use(flips: Callable[[float], Sequence[float]]) -> None:
         def measure(
-            bench: room._Bench, shown: object, distance_m: float, which: Sequence[int]
+            bench: room._Measuring, shown: object, distance_m: float, which: Sequence[int]
         ) -> list[Scores]:
             pixels = bench.pixels(distance_m)
             return [
@@ -55,7 +55,7 @@ def curves(monkeypatch: pytest.MonkeyPatch) -> Curves:
                 for index in which
             ]
 
-        monkeypatch.setattr(room._Bench, "_measure", measure)
+        monkeypatch.setattr(room._Measuring, "_measure", measure)
 
     return use
 

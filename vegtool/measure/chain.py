@@ -60,7 +60,7 @@ def with_distances(
         return _unmeasured(plant, levels, least_m)
     least_m = [max(pair) for pair in zip(least_m, _by_texels(levels, display), strict=True)]
     with ExitStack() as stack:
-        return _by_error(_Bench(stack, plant, levels, options, display), least_m, progress)
+        return _by_error(_Measuring(stack, plant, levels, options, display), least_m, progress)
 
 
 def misses(levels: Sequence[Level], options: MeasureOptions) -> list[str]:
@@ -86,7 +86,7 @@ def miss(what: str, from_m: float, limit: float, held_out: float) -> str:
     )
 
 
-class _Bench:
+class _Measuring:
     """Measures the original as clients have it (index 0) and the levels (1, 2, ...), each once at
     a distance."""
 
@@ -187,7 +187,7 @@ def _unmeasured(
 
 
 def _by_error(
-    bench: _Bench, least_m: Sequence[float], progress: Progress
+    bench: _Measuring, least_m: Sequence[float], progress: Progress
 ) -> tuple[tuple[Level, ...], tuple[str, ...]]:
     """Distances by measured error, and no less than `least_m`, (l,) metres."""
     options = bench.options
@@ -226,7 +226,7 @@ def _limits(live: FloatArray, options: MeasureOptions) -> FloatArray:
 
 
 def _despite(
-    bench: _Bench, distance_m: float, flips: FloatArray
+    bench: _Measuring, distance_m: float, flips: FloatArray
 ) -> tuple[tuple[float | LeftOut, ...], list[str]]:
     """Where no level keeps to the limit at any size: the best one, from the last distance on.
 
