@@ -74,3 +74,56 @@ def test_four_texels_to_a_pixel_along_one_axis_keep_the_other_sharp():
     with PlantBuffers(replace(plant, uvs=uvs * [4, 1]), mipmaps=True) as buffers:
         grey = draw(buffers, shot, ambient)
     np.testing.assert_allclose(grey[8:56, 8:56, 0], 0.5, atol=0.02)
+    with PlantBuffers(plant, mipmaps=True) as buffers:
+        trilinear = draw(buffers, shot, ambient, anisotropy=1)
+    np.testing.assert_allclose(trilinear[8:56, 8:56, 0], 0.5, atol=0.02)
+
+
+@pytest.mark.gl
+@pytest.mark.parametrize("texels", [1, 2, 4, 6])
+def test_one_tap_reads_the_mips_of_the_longer_axis(texels):
+    """So many texels to a pixel along one axis, one along the other, each mip of a grey of its
+    own: the picture's grey lies between those of the two mips around log2 of the longer axis."""
+    image = np.zeros((64 * texels, 64, 4), np.uint8)
+    corners = np.array([[-0.5, -0.5, 0], [0.5, -0.5, 0], [0.5, 0.5, 0], [-0.5, 0.5, 0]])
+    uvs = np.array([[0, 1], [1, 1], [1, 0], [0, 0.0]])
+    leaf = Material("m", color_texture=Texture("t", image))
+    faces = [[0, 1, 2], [0, 2, 3]]
+    plant = Plant("p", corners, np.tile([0.0, 0, 1], (4, 1)), uvs, faces, [0, 0], (leaf,))
+    camera = Camera(np.zeros(3), direction(0, 0), 10.0, 640.0, 64, 64, (32.0, 32.0), 2.0)
+    shot = Shot(camera.view_projection(), camera.target, 64, 64)
+    grey = srgb_from_linear(np.arange(7) / 8)
+    with PlantBuffers(plant, mipmaps=True) as buffers:
+        (group,) = buffers.groups
+        for level in range(7):
+            width, height = max(64 >> level, 1), max(64 * texels >> level, 1)
+            made = np.full((height, width, 4), round(255 * grey[level]), np.uint8)
+            group.color_map.write(made.tobytes(), level=level)
+        light = Light(sun=0.0, sky_above=1.0, sky_below=1.0)
+        picture = draw(buffers, shot, light, anisotropy=1)
+    np.testing.assert_allclose(picture[8:56, 8:56, 0], np.log2(texels) / 8, atol=0.01)
+
+
+@pytest.mark.gl
+@pytest.mark.parametrize("anisotropy", [1, 4])
+def test_a_face_that_shows_one_place_of_a_texture_shows_its_finest_texels(anisotropy):
+    """Its texture coordinates stand still: the logarithm of a footprint of 0 must not matter. The
+    one white texel among black ones would be grey in every mip."""
+    image = np.zeros((64, 64, 4), np.uint8)
+    image[..., 3] = 255
+    image[20:22, 40:42] = 255
+    flat = Texture("n", np.tile(np.array([128, 128, 255, 255], np.uint8), (64, 64, 1)))
+    corners = np.array([[-0.5, -0.5, 0], [0.5, -0.5, 0.3], [0.5, 0.5, 0], [-0.5, 0.5, -0.3]])
+    uvs = np.tile([41 / 64, 21 / 64], (4, 1))
+    leaf = Material("m", color_texture=Texture("t", image), normal_texture=flat, alpha_mode="mask")
+    faces = [[0, 1, 2], [0, 2, 3]]
+    plant = Plant("p", corners, np.tile([0.0, 0, 1], (4, 1)), uvs, faces, [0, 0], (leaf,))
+    camera = Camera(np.zeros(3), direction(20, 30), 3.0, 200.0, 64, 64, (32.0, 32.0), 2.0)
+    shot = Shot(camera.view_projection(), camera.target, 64, 64)
+    light = Light(direction=np.array([0.0, 0.0, 1.0]), sun=1.0, sky_above=0.0, sky_below=0.0)
+    with PlantBuffers(plant, mipmaps=True) as buffers:
+        picture = draw(buffers, shot, light, samples=4, anisotropy=anisotropy)
+    assert np.isfinite(picture).all()
+    inside = picture[..., 3] == 1
+    assert inside.sum() > 1000
+    np.testing.assert_allclose(picture[inside][:, :3], 1, atol=0.01)

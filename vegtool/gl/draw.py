@@ -18,6 +18,8 @@ from vegtool.gl.upload import MaterialGroup, PlantBuffers
 
 MSAA = 4
 """Samples per pixel of a live picture, as engines do by default."""
+ANISOTROPY = 4
+"""Taps along the longer axis of a pixel's footprint, as engines filter textures by default."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,22 +44,27 @@ class Light:
 
 
 def draw(
-    buffers: PlantBuffers, shot: Shot, light: Light, supersample: int = 1, samples: int = 0
+    buffers: PlantBuffers,
+    shot: Shot,
+    light: Light,
+    supersample: int = 1,
+    samples: int = 0,
+    anisotropy: int = ANISOTROPY,
 ) -> Picture:
     """The picture of a plant or level.
 
     supersample: samples per axis and pixel, averaged. samples: of multisampling, 0 for none; alpha
-    is tested once per pixel then, as in a client. Raises CapabilityError where OpenGL cannot
-    multisample so, or cannot hold the plant or the picture.
+    is tested once per pixel then, as in a client. anisotropy: most taps of a mip-mapped texture; 1
+    is trilinear filtering. Raises CapabilityError where OpenGL cannot multisample so, or cannot
+    hold the plant or the picture.
     """
     ctx = buffers.ctx
     picture = np.empty((shot.height, shot.width, 4), np.float32)
     with framebuffer_kept(ctx):
         for x, y, part in tiles(ctx, shot, supersample):
             size = (0, 0, part.width, part.height)
-            data = draw_tile(buffers, part, light, supersample, samples).frame.read(
-                size, components=4, dtype="f4"
-            )
+            drawn = draw_tile(buffers, part, light, supersample, samples, anisotropy)
+            data = drawn.frame.read(size, components=4, dtype="f4")
             pixels = np.frombuffer(data, np.float32).reshape(part.height, part.width, 4)
             picture[y : y + part.height, x : x + part.width] = pixels
         check(ctx)
@@ -77,7 +84,12 @@ def tiles(ctx: moderngl.Context, shot: Shot, supersample: int) -> Iterator[tuple
 
 
 def draw_tile(
-    buffers: PlantBuffers, shot: Shot, light: Light, supersample: int, samples: int
+    buffers: PlantBuffers,
+    shot: Shot,
+    light: Light,
+    supersample: int,
+    samples: int,
+    anisotropy: int = ANISOTROPY,
 ) -> Target:
     """Draw a picture that a target can hold; what is returned has it in its lower left corner,
     top row first. The caller keeps the framebuffer (`framebuffer_kept`)."""
@@ -85,7 +97,7 @@ def draw_tile(
     size = supersample * shot.width, supersample * shot.height
     drawn = drawing_target(ctx, size, samples)
     begin(drawn, size)
-    render(buffers, shot, light, supersample)
+    render(buffers, shot, light, supersample, anisotropy)
     return _resolved(ctx, drawn, (shot.width, shot.height), supersample, samples)
 
 
@@ -98,13 +110,19 @@ def begin(drawn: Target, size: tuple[int, int]) -> None:
     drawn.frame.ctx.enable(moderngl.DEPTH_TEST)
 
 
-def render(buffers: PlantBuffers, shot: Shot, light: Light, supersample: int = 1) -> None:
+def render(
+    buffers: PlantBuffers,
+    shot: Shot,
+    light: Light,
+    supersample: int = 1,
+    anisotropy: int = ANISOTROPY,
+) -> None:
     """Draw a plant into the framebuffer in use, whose pixels are `supersample` of the shot's."""
     ctx = buffers.ctx
     matrix = placed(buffers, shot)
     samples_per_metre = supersample * _pixels_per_metre(shot)
     sun = tuple(light.direction / np.linalg.norm(light.direction))
-    mips = ("MIPMAPPED",) if buffers.mipmaps else ()
+    mips = ("MIPMAPPED", f"ANISOTROPY {anisotropy}.0") if buffers.mipmaps else ()
     for group in buffers.groups:
         plain = () if group.material.color_texture is not None else ("NO_COLOR_MAP",)
         mapped = () if group.normal_map is None else ("NORMAL_MAP",)

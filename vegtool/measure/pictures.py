@@ -7,7 +7,7 @@ import numpy as np
 from vegtool.arrays import FloatArray, Picture
 from vegtool.gl.context import context, describe
 from vegtool.gl.count import count_fragments
-from vegtool.gl.draw import MSAA, Light, Shot, draw
+from vegtool.gl.draw import ANISOTROPY, MSAA, Light, Shot, draw
 from vegtool.gl.targets import drawing_target
 from vegtool.gl.timing import time_frames
 from vegtool.gl.upload import PlantBuffers
@@ -68,11 +68,17 @@ def truth(
     return draw(buffers, _shot(camera), light or Light(), supersample)
 
 
-def live(buffers: PlantBuffers, camera: Camera, light: Light | None = None) -> Picture:
+def live(
+    buffers: PlantBuffers,
+    camera: Camera,
+    light: Light | None = None,
+    anisotropy: int = ANISOTROPY,
+) -> Picture:
     """What a client shows: mip-mapped textures, alpha tested once per pixel, 4x multisampling
-    resolved in linear light. buffers: with mipmaps. Raises CapabilityError where OpenGL cannot.
+    resolved in linear light. buffers: with mipmaps. anisotropy: of textures; 1, trilinear
+    filtering, is how three.js comes. Raises CapabilityError where OpenGL cannot.
     """
-    return draw(buffers, _shot(camera), light or Light(), samples=MSAA)
+    return draw(buffers, _shot(camera), light or Light(), samples=MSAA, anisotropy=anisotropy)
 
 
 def fragments(buffers: PlantBuffers, camera: Camera) -> int:
