@@ -1,4 +1,4 @@
-"""What goes out: levels of detail, each a mesh or a cloud of billboards, and the chain of them.
+"""What goes out: levels of detail, each a mesh, a cloud of billboards or both, and their chain.
 
 Field terms: a *billboard* is one textured rectangle fixed in the plant's space; a *cluster* is the
 set of faces that it shows; a *shape* is how many billboards show one cluster (1, 2 or 3 crossed).
@@ -6,17 +6,17 @@ set of faces that it shows; a *shape* is how many billboards show one cluster (1
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from math import radians, tan
 from typing import Any, Literal
 
 import numpy as np
 
-from vegtool.arrays import ByteArray, FloatArray, IntArray, checked
+from vegtool.arrays import ByteArray, FloatArray, IntArray, checked, unit
 from vegtool.plant import Plant
 
-Kind = Literal["mesh", "billboards"]
+Kind = Literal["mesh", "billboards", "hybrid"]
 
 FADE_FRACTION = 0.15
 """Of its switch distance: beyond it the level before is still drawn, fading out or, for a viewer
@@ -92,6 +92,8 @@ class Atlas:
     included. Both pictures have their left edge at -u and their top edge at +v, so the back's is
     the mirror image of what one sees from behind; a back normal's z points along -(u x v).
     back equals front where one picture serves both sides.
+    white: (4,) int32 texels, as front: a block of opaque white with a flat normal, for a mesh in
+    the same draw call to show all over; or None.
     """
 
     color: ByteArray
@@ -99,6 +101,7 @@ class Atlas:
     depth: np.ndarray
     front: IntArray
     back: IntArray
+    white: IntArray | None = None
 
     def __post_init__(self) -> None:
         color = checked("Atlas.color", self.color, (None, None, 4), np.uint8)
@@ -111,6 +114,8 @@ class Atlas:
             "front": front,
             "back": checked("Atlas.back", self.back, (len(front), 4), np.int32),
         }
+        if self.white is not None:
+            values["white"] = checked("Atlas.white", self.white, (4,), np.int32)
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
@@ -150,10 +155,13 @@ class Measured:
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """One level of detail: a mesh (a Plant), or billboards with their atlas.
+    """One level of detail: a mesh (a Plant), billboards with their atlas, or both.
 
+    kind: a hybrid level is billboards and an opaque mesh without textures, coloured by its
+    vertices, which are drawn as one (`level_triangles`): its atlas has a white block.
     double_sided: one quad per billboard, drawn from both sides with one picture (the client flips
-    the normal on the back). Else two opposite single-sided quads, each with its own picture.
+    the normal on the back). Else two opposite single-sided quads, each with its own picture; a
+    hybrid's mesh then has its double-sided faces twice.
     texels_per_metre: density of the atlas. near_distance_m: from here on the level may be used.
     geometric_error_m: (maximum, 95th percentile) of DESIGN section 7, or None if not computed.
     measured: its errors at near_distance_m, or None where they were not measured.
@@ -174,19 +182,38 @@ class Level:
     def __post_init__(self) -> None:
         if self.kind == "mesh" and self.mesh is None:
             raise ValueError("Level: a mesh level needs its mesh")
-        if self.kind == "billboards" and (self.billboards is None or self.atlas is None):
+        if self.kind != "mesh" and (self.billboards is None or self.atlas is None):
             raise ValueError("Level: a billboard level needs billboards and an atlas")
+        if self.kind == "hybrid":
+            self._check_hybrid()
         pair = self.billboards, self.atlas
         if pair[0] is not None and pair[1] is not None and len(pair[1].front) != len(pair[0]):
             raise ValueError("Level: the atlas needs one rectangle per billboard")
 
+    def _check_hybrid(self) -> None:
+        if self.mesh is None or self.mesh.colors is None:
+            raise ValueError("Level: a hybrid level needs a mesh with colours")
+        if self.atlas is None or self.atlas.white is None:
+            raise ValueError("Level: a hybrid level needs an atlas with a white block")
+        for m in self.mesh.materials:
+            if m.color_texture or m.normal_texture or m.alpha_mode != "opaque":
+                raise ValueError(f"Level: material {m.name} of a hybrid must be opaque and plain")
+
     @property
     def triangles(self) -> int:
         """Triangles as they stand in the file."""
-        if self.billboards is not None:
-            return len(self.billboards) * (2 if self.double_sided else 4)
-        assert self.mesh is not None
-        return len(self.mesh.faces)
+        quads = 0 if self.billboards is None else len(self.billboards)
+        return self.mesh_triangles + quads * (2 if self.double_sided else 4)
+
+    @property
+    def mesh_triangles(self) -> int:
+        """Those of them that are the mesh's."""
+        if self.mesh is None:
+            return 0
+        if self.kind == "mesh" or self.double_sided:
+            return len(self.mesh.faces)
+        twice = np.array([m.double_sided for m in self.mesh.materials])
+        return len(self.mesh.faces) + int(twice[self.mesh.face_material].sum())
 
     @property
     def texels(self) -> int:
@@ -216,12 +243,11 @@ class LodChain:
 
 
 @dataclass(frozen=True, eq=False)
-class Quads:
-    """A billboard level as the triangles that a client draws: q quads, 4 vertices each.
+class Triangles:
+    """A level with an atlas as the triangles that a client draws, v vertices and f faces.
 
-    positions (4q, 3), normals (4q, 3), tangents (4q, 4; w is the bitangent's sign) and uvs (4q, 2)
-    float64; indices (6q,) int32. Corner order: lower left, lower right, upper right, upper left as
-    seen from the front.
+    positions (v, 3), normals (v, 3), tangents (v, 4; w is the bitangent's sign) and uvs (v, 2)
+    float64; indices (3f,) int32. colors: (v, 4) linear factors of the texture, or None.
     """
 
     positions: FloatArray
@@ -229,10 +255,68 @@ class Quads:
     tangents: FloatArray
     uvs: FloatArray
     indices: IntArray
+    colors: FloatArray | None = None
 
 
-def billboard_quads(level: Level) -> Quads:
-    """The quads of a billboard level: one per billboard if double-sided, else front and back.
+def level_triangles(level: Level) -> Triangles:
+    """What a client draws of a level with an atlas, in one call: its quads, then its mesh.
+
+    All vertices of a hybrid's mesh show the middle of the white block: their texture coordinates
+    stand still over every face, so that clients sample it at full size, whatever the distance.
+    Their normals are the vertices' own (the block's normal is flat), so that any tangent will do.
+    """
+    quads = billboard_quads(level)
+    if level.kind != "hybrid":
+        return quads
+    mesh, atlas = level.mesh, level.atlas
+    assert mesh is not None and mesh.colors is not None
+    assert atlas is not None and atlas.white is not None
+    height, width = atlas.color.shape[:2]
+    x0, y0, w, h = atlas.white.astype(np.float64)
+    white = (x0 + w / 2) / width, (y0 + h / 2) / height
+    parts = [replace(quads, colors=np.ones((len(quads.positions), 4)))]
+    for index in np.unique(mesh.face_material):
+        material = mesh.materials[index]
+        vertices, corners = np.unique(mesh.faces[mesh.face_material == index], return_inverse=True)
+        count = len(vertices)
+        colors = np.clip(mesh.colors[vertices] * material.base_color, 0.0, 1.0)
+        colors[:, 3] = 1.0
+        normals = mesh.normals[vertices]
+        front = Triangles(
+            mesh.positions[vertices],
+            normals,
+            np.concatenate([_perpendicular(normals), np.ones((count, 1))], axis=1),
+            np.tile(white, (count, 1)),
+            corners.ravel().astype(np.int32),
+            colors,
+        )
+        parts.append(front)
+        if material.double_sided and not level.double_sided:
+            parts.append(replace(front, normals=-normals, indices=front.indices[::-1]))
+    return _joined(parts)
+
+
+def _perpendicular(normals: FloatArray) -> FloatArray:
+    """(n, 3) unit vectors, some direction perpendicular to each."""
+    axis = np.eye(3)[np.abs(normals).argmin(axis=1)]
+    across = np.cross(normals, axis)
+    return np.asarray(np.where(across.any(axis=1, keepdims=True), unit(across), axis))
+
+
+def _joined(parts: list[Triangles]) -> Triangles:
+    """All parts as one, in order."""
+    first = np.cumsum([0, *(len(part.positions) for part in parts)])
+    arrays: dict[str, Any] = {
+        name: np.concatenate([getattr(part, name) for part in parts])
+        for name in (f.name for f in fields(Triangles) if f.name != "indices")
+    }
+    indices = [part.indices + start for part, start in zip(parts, first, strict=False)]
+    return Triangles(**arrays, indices=np.concatenate(indices).astype(np.int32))
+
+
+def billboard_quads(level: Level) -> Triangles:
+    """The quads of a level: one per billboard if double-sided, else front and back; 4 vertices
+    each, lower left, lower right, upper right and upper left as seen from the front.
 
     Both quads of a pair keep the corner positions' texture coordinates (Atlas.back is stored
     mirrored), so the back's tangent runs along u like the front's: its normal turns, its tangent
@@ -240,7 +324,7 @@ def billboard_quads(level: Level) -> Quads:
     """
     b, atlas = level.billboards, level.atlas
     if b is None or atlas is None:
-        raise ValueError("billboard_quads: needs a level of kind billboards")
+        raise ValueError("billboard_quads: needs a level with billboards")
     signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=np.float64)
     steps = signs[None] * b.half_size[:, None]  # (p, 4, 2)
     corners = b.center[:, None] + steps[..., :1] * b.u[:, None] + steps[..., 1:] * b.v[:, None]
@@ -265,7 +349,7 @@ def billboard_quads(level: Level) -> Quads:
 
     triangle = np.array([0, 1, 2, 0, 2, 3], dtype=np.int32)
     base = 4 * np.arange(len(b), dtype=np.int32)[:, None]
-    front = Quads(
+    front = Triangles(
         corners.reshape(-1, 3),
         np.repeat(b.normal, 4, axis=0),
         tangents(1.0),
@@ -274,7 +358,7 @@ def billboard_quads(level: Level) -> Quads:
     )
     if level.double_sided:
         return front
-    return Quads(
+    return Triangles(
         np.concatenate([front.positions, front.positions]),
         np.concatenate([front.normals, -front.normals]),
         np.concatenate([front.tangents, tangents(-1.0)]),

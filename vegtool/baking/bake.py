@@ -30,6 +30,10 @@ MOST_SAMPLES = 8
 """Samples per axis that small atlases are raised to; alpha then has 64 steps."""
 CHEAP_SAMPLES = 2_000_000
 """Samples of an atlas up to which more of them per texel cost little."""
+WHITE = 4
+"""Texels: side of a white block. In the middle of four, mips 0 and 1 are white wherever it lies."""
+FLAT = (128, 128, 255)
+"""A normal that points straight out."""
 
 
 def bake(
@@ -39,21 +43,23 @@ def bake(
     texels_per_metre: float,
     options: BakeOptions | None = None,
     progress: Progress = silent,
+    white: bool = False,
 ) -> Level:
     """Bake the faces of each cluster into the pictures of the billboards that show it.
 
     plant: give PlantBuffers to bake several levels from one upload. labels: (f,) int32 cluster of
-    each face, matching `billboards.cluster`; faces of clusters that no billboard shows are left
-    out. The level's billboards are those given, some turned round (u and the normal), so that the
-    side which shows more is in front; its density is lower than asked for where max_texture forbids
-    that. From where it may be used, and its errors, are for others to say. Raises UsageError where
-    the pictures cannot fit into max_texture at any density, and CapabilityError where there is no
-    OpenGL.
+    each face, matching `billboards.cluster`; faces of clusters that no billboard shows, and those
+    of cluster -1, are left out. white: give the atlas a white block, for a mesh beside the
+    billboards (Atlas.white). The level's billboards are those given, some turned round (u and the
+    normal), so that the side which shows more is in front; its density is lower than asked for
+    where max_texture forbids that. From where it may be used, and its errors, are for others to
+    say. Raises UsageError where the pictures cannot fit into max_texture at any density, and
+    CapabilityError where there is no OpenGL.
     """
     options = options or BakeOptions()
     if isinstance(plant, Plant):
         with PlantBuffers(plant) as buffers:
-            return bake(buffers, labels, billboards, texels_per_metre, options, progress)
+            return bake(buffers, labels, billboards, texels_per_metre, options, progress, white)
     seconds: dict[str, float] = {}
     progress("bake", 0.0)
     with timed(seconds, "pairs"):
@@ -70,7 +76,8 @@ def bake(
         half_size = np.concatenate([billboards.half_size, billboards.half_size[behind]])
         half_size[len(billboards) :][sides.back[behind] == 0] = 0  # nothing there: one texel
         limit = min(options.max_texture, describe(plant.ctx).max_texture)
-        packing, density = fit(half_size, texels_per_metre, options.gutter, limit)
+        blocks = int(white)
+        packing, density = fit(half_size, texels_per_metre, options.gutter, limit, blocks)
         samples = supersample(packing, options)
 
     which = np.concatenate([np.arange(len(billboards)), behind])
@@ -78,7 +85,7 @@ def bake(
     back_face, back_picture = _pairs_behind(face, shown_by, behind, len(billboards))
     drawn = draw_pictures(
         plant,
-        pictures_of(billboards, which, side, packing.rect),
+        pictures_of(billboards, which, side, packing.rect[: len(which)]),
         np.concatenate([face, back_face]),
         np.concatenate([shown_by, back_picture]),
         (packing.width, packing.height),
@@ -89,8 +96,12 @@ def bake(
     with timed(seconds, "dilate"):
         front = packing.rect[: len(billboards)]
         back = front.copy()
-        back[behind] = packing.rect[len(billboards) :]
-        atlas = Atlas(*dilated(drawn, packing), drawn.depth, front, back)
+        back[behind] = packing.rect[len(billboards) : len(which)]
+        color, normal = dilated(drawn, packing)
+        block = packing.rect[-1] if white else None
+        if block is not None:
+            whiten(color, normal, block, options.gutter)
+        atlas = Atlas(color, normal, drawn.depth, front, back, block)
     progress("bake", 1.0)
     return Level(
         "billboards",
@@ -108,7 +119,7 @@ def pairs(labels: IntArray, cluster: IntArray) -> tuple[IntArray, IntArray]:
     order = np.argsort(cluster, kind="stable").astype(np.int32)
     shown = np.bincount(cluster, minlength=count)
     first = np.cumsum(shown) - shown
-    times = shown[labels]
+    times = np.where(labels >= 0, shown[labels], 0)
     face = np.repeat(np.arange(len(labels), dtype=np.int32), times)
     nth = np.arange(len(face)) - np.repeat(np.cumsum(times) - times, times)
     return face, order[np.repeat(first[labels], times) + nth]
@@ -126,18 +137,23 @@ def _pairs_behind(
 
 
 def fit(
-    half_size: FloatArray, texels_per_metre: float, gutter: int, max_texture: int
+    half_size: FloatArray, texels_per_metre: float, gutter: int, max_texture: int, blocks: int = 0
 ) -> tuple[Packing, float]:
-    """Pictures in whole texels, packed; the density is lowered until max_texture holds them."""
+    """Pictures in whole texels, packed; the density is lowered until max_texture holds them.
+
+    blocks: how many white ones (`WHITE`) to pack after the pictures.
+    """
     density, longest = texels_per_metre, max_texture - 2 * gutter
+    extra = np.full((blocks, 2), WHITE)
     while True:
         sizes = np.maximum(1, np.rint(2 * density * half_size))  # integers too large for int32
         if sizes.max() > max(longest, 1):
             density *= longest / sizes.max()
             continue
-        excess = float(np.prod(sizes + 2 * gutter, axis=1).sum()) / max_texture**2
+        packed = np.concatenate([sizes, extra])
+        excess = float(np.prod(packed + 2 * gutter, axis=1).sum()) / max_texture**2
         if excess <= 1:
-            packing = pack(sizes.astype(np.int32), gutter, max_texture)
+            packing = pack(packed.astype(np.int32), gutter, max_texture)
             excess = max(packing.width, packing.height) / max_texture
             if excess <= 1:
                 return packing, density
@@ -163,3 +179,11 @@ def dilated(drawn: Drawn, packing: Packing) -> tuple[ByteArray, ByteArray]:
     color = drawn.color.reshape(-1, 4)[nearest]
     color[..., 3] = coverage_kept(drawn.color[..., 3], packing.rect, packing.gutter)
     return color, drawn.normal.reshape(-1, 3)[nearest]
+
+
+def whiten(color: ByteArray, normal: ByteArray, block: IntArray, gutter: int) -> None:
+    """Paint a block (4,) of an atlas, and its gutter, opaque white and facing straight out."""
+    x, y, w, h = block.tolist()
+    painted = np.s_[y - gutter : y + h + gutter, x - gutter : x + w + gutter]
+    color[painted] = 255
+    normal[painted] = FLAT

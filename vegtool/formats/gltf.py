@@ -22,7 +22,7 @@ from vegtool.formats.atomic import FileSet
 from vegtool.formats.glb import ELEMENT_ARRAY_BUFFER, Document
 from vegtool.formats.manifest import LevelFile, encode, manifest, screen_height_fraction
 from vegtool.formats.tangents import tangents
-from vegtool.lod import Level, LodChain, billboard_quads
+from vegtool.lod import Level, LodChain, level_triangles
 from vegtool.plant import Branches, Material, Plant, Texture
 
 ALPHA_CUTOFF = 0.5  # of a billboard: what baking/coverage.py fits its alpha to
@@ -51,8 +51,9 @@ def plant_glb(plant: Plant) -> bytes:
 def level_glb(level: Level, name: str, images: EncodedImages | None = None) -> bytes:
     """One level as a .glb file whose node is called `name`.
 
-    Billboards are one mesh with one primitive and one material, alpha-tested. `images` carries
-    encoded images from one call to the next for the same chain.
+    Billboards are one mesh with one primitive and one material, alpha-tested; the mesh of a hybrid
+    level is in the same primitive, coloured by COLOR_0. `images` carries encoded images from one
+    call to the next for the same chain.
     """
     writer = _Writer(_local_origin(_bounds(level)), {} if images is None else images)
     writer.document.show(writer.add_level(level, name))
@@ -162,25 +163,27 @@ class _Writer:
         if level.kind == "mesh":
             assert level.mesh is not None
             return self.add_plant(level.mesh, name)
-        return self.add_billboards(level, name)
+        return self.add_atlas_level(level, name)
 
     def add_plant(self, plant: Plant, name: str, branches: Branches | None = None) -> int:
         """Add a plant, with the branch of each vertex if `branches` are given; return its node."""
         used = np.unique(plant.face_material).tolist()
         return self._add_node(name, [self._add_part(plant, index, branches) for index in used])
 
-    def add_billboards(self, level: Level, name: str) -> int:
-        """Add a billboard level; return its node."""
-        quads = billboard_quads(level)
+    def add_atlas_level(self, level: Level, name: str) -> int:
+        """Add a level of billboards, with or without a mesh beside them; return its node."""
+        drawn = level_triangles(level)
         attributes = {
-            "POSITION": self._add_positions(quads.positions),
-            "NORMAL": self._add_floats(quads.normals),
-            "TANGENT": self._add_floats(quads.tangents),
-            "TEXCOORD_0": self._add_floats(quads.uvs),
+            "POSITION": self._add_positions(drawn.positions),
+            "NORMAL": self._add_floats(_unit_normals(drawn.normals)),
+            "TANGENT": self._add_floats(drawn.tangents),
+            "TEXCOORD_0": self._add_floats(drawn.uvs),
         }
+        if drawn.colors is not None:
+            attributes["COLOR_0"] = self._add_colors(drawn.colors)
         primitive = {
             "attributes": attributes,
-            "indices": self._add_indices(quads.indices, len(quads.positions)),
+            "indices": self._add_indices(drawn.indices, len(drawn.positions)),
             "material": self._add_atlas_material(level, name),
         }
         return self._add_node(name, [primitive])
@@ -218,9 +221,7 @@ class _Writer:
         if textured or plant.uvs.any():
             attributes["TEXCOORD_0"] = self._add_floats(plant.uvs[vertices])
         if plant.colors is not None:
-            share = np.clip(plant.colors[vertices], 0.0, 1.0)
-            colors = np.round(share * 65535).astype(np.uint16)
-            attributes["COLOR_0"] = self.document.add_accessor(colors, normalized=True)
+            attributes["COLOR_0"] = self._add_colors(plant.colors[vertices])
         if branches is not None and owner is not None:
             attributes["_BRANCH"] = self._add_floats(owner)
             attributes["_BRANCH_PARENT"] = self._add_floats(branches.parent[owner])
@@ -236,6 +237,11 @@ class _Writer:
 
     def _add_floats(self, values: FloatArray | IntArray) -> int:
         return self.document.add_accessor(values.astype(np.float32))
+
+    def _add_colors(self, colors: FloatArray) -> int:
+        """Linear factors in 16 bits: 8 would round dark bark by a tenth."""
+        shorts = np.round(np.clip(colors, 0.0, 1.0) * 65535).astype(np.uint16)
+        return self.document.add_accessor(shorts, normalized=True)
 
     def _add_indices(self, indices: IntArray, vertices: int) -> int:
         dtype = np.uint16 if vertices <= _SHORT_INDICES else np.uint32
@@ -312,7 +318,7 @@ def _bounds(level: Level) -> FloatArray:
     """(2, 3) metres: least and greatest corner of what the level draws."""
     if level.mesh is not None and level.kind == "mesh":
         return level.mesh.bounds
-    positions = billboard_quads(level).positions
+    positions = level_triangles(level).positions
     return np.stack([positions.min(axis=0), positions.max(axis=0)])
 
 

@@ -11,7 +11,7 @@ from vegtool.gl.draw import ANISOTROPY, MSAA, Light, Shot, draw
 from vegtool.gl.targets import drawing_target
 from vegtool.gl.timing import time_frames
 from vegtool.gl.upload import PlantBuffers
-from vegtool.lod import Level, billboard_quads
+from vegtool.lod import Level, level_triangles
 from vegtool.measure.views import Camera
 from vegtool.plant import Material, Plant, Texture
 
@@ -21,10 +21,11 @@ TRUTH_SUPERSAMPLE = 8
 
 def client_plant(level: Level) -> Plant:
     """A level as the mesh that a client gets from its file, so that one path draws everything."""
-    if level.mesh is not None:
+    if level.kind == "mesh":
+        assert level.mesh is not None
         return level.mesh
     assert level.atlas is not None
-    quads = billboard_quads(level)
+    drawn = level_triangles(level)
     opaque = np.full((*level.atlas.normal.shape[:2], 1), 255, np.uint8)
     material = Material(
         "level",
@@ -33,9 +34,17 @@ def client_plant(level: Level) -> Plant:
         alpha_mode="mask",
         double_sided=level.double_sided,
     )
-    faces = quads.indices.reshape(-1, 3)
-    nothing = np.zeros(len(faces), np.int32)
-    return Plant("level", quads.positions, quads.normals, quads.uvs, faces, nothing, (material,))
+    faces = drawn.indices.reshape(-1, 3)
+    return Plant(
+        "level",
+        drawn.positions,
+        drawn.normals,
+        drawn.uvs,
+        faces,
+        np.zeros(len(faces), np.int32),
+        (material,),
+        drawn.colors,
+    )
 
 
 def renderer() -> dict[str, str]:
