@@ -1,8 +1,10 @@
-"""How far billboards draw a plant's surface from where it is: `geometric_error_m`."""
+"""How far a level draws a plant's surface from where it is: `geometric_error_m`."""
 
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
+from scipy.spatial import cKDTree
 
 from vegtool.arrays import FloatArray, IntArray
 from vegtool.lod import Billboards
@@ -10,19 +12,43 @@ from vegtool.plant import Plant
 
 SAMPLES = 65536
 """Points on the surface, each for the same area."""
+NEAREST = 8
+"""Points of a mesh around a point whose triangles may be the nearest."""
 
 
-def geometric_error(plant: Plant, labels: IntArray, billboards: Billboards) -> tuple[float, float]:
+def geometric_error(
+    plant: Plant,
+    labels: IntArray,
+    billboards: Billboards,
+    mesh: Plant | None = None,
+    by_mesh: npt.NDArray[np.bool_] | None = None,
+) -> tuple[float, float]:
     """Greatest and 95th percentile distance, metres, from surface points to where they are drawn.
 
-    labels: (f,) the cluster of each face. The plane that shows a point counts; of crossed planes
-    the nearest one does. Points are spread evenly over the area, the same ones at every call.
-    Raises ValueError where a cluster that has faces has no billboard.
+    labels: (f,) the cluster of each face; -1 for faces that no billboard shows. mesh: of a hybrid
+    level; by_mesh: (f,) bool, the faces that it shows. What shows a point counts: its plane, of
+    crossed planes the nearest one, or the nearest place of the mesh. Points are spread evenly over
+    the area, the same ones at every call; what nothing shows is left out. Raises ValueError where a
+    cluster that has faces has no billboard, and where nothing is shown.
     """
     face, points = surface_samples(plant, SAMPLES)
-    cluster = labels[face]
+    distance = np.full(len(points), np.inf)
+    planar = labels[face] >= 0
+    if planar.any():
+        distance[planar] = _to_planes(points[planar], labels[face[planar]], billboards)
+    if mesh is not None and by_mesh is not None:
+        shown = by_mesh[face]
+        distance[shown] = np.minimum(distance[shown], distance_to_mesh(points[shown], mesh))
+    distance = distance[np.isfinite(distance)]
+    if not len(distance):
+        raise ValueError("geometric_error: nothing shows the plant")
+    return float(distance.max()), float(np.quantile(distance, 0.95))
+
+
+def _to_planes(points: FloatArray, cluster: IntArray, billboards: Billboards) -> FloatArray:
+    """(n,) metres from points to the nearest plane of their clusters (n,)."""
     order = np.argsort(billboards.cluster, kind="stable")
-    per_cluster = np.bincount(billboards.cluster, minlength=int(labels.max()) + 1)
+    per_cluster = np.bincount(billboards.cluster, minlength=int(cluster.max()) + 1)
     if not per_cluster[cluster].all():
         raise ValueError("geometric_error: every cluster needs a billboard")
     first = np.cumsum(per_cluster) - per_cluster
@@ -32,7 +58,40 @@ def geometric_error(plant: Plant, labels: IntArray, billboards: Billboards) -> t
         offset = points - billboards.center[plane]
         away = np.abs(np.einsum("ni,ni->n", offset, billboards.normal[plane]))
         distance = np.minimum(distance, away)
-    return float(distance.max()), float(np.quantile(distance, 0.95))
+    return distance
+
+
+def distance_to_mesh(points: FloatArray, mesh: Plant) -> FloatArray:
+    """(n,) metres from points (n, 3) to the surface of a mesh.
+
+    Of the triangles under the nearest of many points spread over it: never too small, and exact
+    where one of these triangles is the nearest.
+    """
+    if not len(points):
+        return np.zeros(0)
+    face, samples = surface_samples(mesh, SAMPLES)
+    _, near = cKDTree(samples).query(points, NEAREST)
+    nearest = np.full(len(points), np.inf)
+    for candidate in face[near].T:
+        nearest = np.minimum(nearest, _to_triangles(points, mesh.corners[candidate]))
+    return nearest
+
+
+def _to_triangles(points: FloatArray, corners: FloatArray) -> FloatArray:
+    """(n,) from points (n, 3) to their triangles (n, 3, 3): to the plane above the inside, else to
+    the nearest edge (Ericson, Real-Time Collision Detection, 2005, section 5.1)."""
+    edges = np.roll(corners, -1, axis=1) - corners
+    offset = points[:, None] - corners
+    square = np.einsum("nci,nci->nc", edges, edges)
+    along = np.einsum("nci,nci->nc", offset, edges)
+    share = np.clip(np.divide(along, square, out=np.zeros_like(along), where=square > 0), 0, 1)
+    nearest = np.linalg.norm(offset - share[..., None] * edges, axis=-1).min(axis=1)
+    normal = np.cross(edges[:, 0], edges[:, 1])
+    length = np.linalg.norm(normal, axis=1)
+    inward = np.cross(normal[:, None], edges)
+    above = (np.einsum("nci,nci->nc", offset, inward) >= 0).all(axis=1) & (length > 0)
+    height = np.abs(np.einsum("ni,ni->n", offset[:, 0], normal))
+    return np.asarray(np.divide(height, length, out=nearest, where=above))
 
 
 def surface_samples(plant: Plant, count: int) -> tuple[IntArray, FloatArray]:

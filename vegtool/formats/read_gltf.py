@@ -20,7 +20,7 @@ from vegtool.formats.gltf_data import GltfFile, meshopt_missing, open_gltf
 from vegtool.formats.gltf_material import UvSource, read_materials
 from vegtool.formats.gltf_nodes import Node, scene_nodes
 from vegtool.formats.parts import Declared, IndexArray, Parsed, Part, check_face_count
-from vegtool.formats.vertex_colors import settle_colors
+from vegtool.formats.vertex_colors import settle_colors, texture_spread
 
 UNDERSTOOD = {
     "KHR_mesh_quantization",
@@ -186,13 +186,15 @@ def _read_primitive(
         notes.append(
             f"mesh {name}: its texture is to be clamped or mirrored beyond its edges; it repeats"
         )
+    faces = _triangles(indices.astype(np.int64), mode)
     colors = attributes.get("COLOR_0")
     if colors is not None:
-        colors = settle_colors(colors, textured[material], f"mesh {name}", notes)
+        tints = textured[material] and (uvs is None or texture_spread(uvs, faces))
+        colors = settle_colors(colors, tints, f"mesh {name}", notes)
     _warn_of_rounding(positions, name, notes)
     part = Part(
         positions=_floats(positions),
-        faces=_triangles(indices.astype(np.int64), mode),
+        faces=faces,
         material=material,
         name=name,
         normals=_floats(attributes["NORMAL"]) if "NORMAL" in attributes else None,

@@ -7,6 +7,7 @@ which would paint a plant red, green and black.
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from vegtool.arrays import FloatArray
 
@@ -22,11 +23,12 @@ well below on textured plants, weights for wind above."""
 
 
 def settle_colors(
-    colors: FloatArray, textured: bool, what: str, notes: list[str]
+    colors: FloatArray, tints: bool | npt.NDArray[np.bool_], what: str, notes: list[str]
 ) -> FloatArray | None:
     """(v, 4) linear factors, or None where they change nothing or are no colours.
 
-    colors: (v, 3) or (v, 4). textured: whether the material has a texture to be tinted.
+    colors: (v, 3) or (v, 4). tints: whether they can but tint a texture, or (v,) which of them;
+    the others paint.
     """
     if not len(colors):
         return None
@@ -40,10 +42,22 @@ def settle_colors(
     if highest.max() <= BLACK:
         notes.append(f"{what}: vertex colours are all black; ignored")
         return None
-    if textured and _looks_like_weights(rgb):
+    tinting = rgb[np.broadcast_to(tints, len(rgb))]
+    if len(tinting) and _looks_like_weights(tinting):
         notes.append(f"{what}: vertex colours look like weights for wind, not colours; ignored")
         return None
     return colors
+
+
+def texture_spread(uvs: FloatArray, faces: npt.NDArray[np.integer]) -> npt.NDArray[np.bool_]:
+    """(v,) whether a vertex belongs to a face that spreads over the texture.
+
+    A face whose corners all show one place of it has the colour of its vertices.
+    """
+    spread = np.zeros(len(uvs), bool)
+    corners = uvs[faces]
+    spread[faces[(corners != corners[:, :1]).any(axis=(1, 2))]] = True
+    return spread
 
 
 def _looks_like_weights(rgb: FloatArray) -> bool:

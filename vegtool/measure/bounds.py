@@ -143,18 +143,21 @@ def distance_for_pixels(level: Level, center: FloatArray, display: Display, pixe
     """Metres from `center`, (3,), from which a level is valid to `pixels` from every direction.
 
     That is eq. 1 with bounds for both errors: nothing is drawn further than that from its place,
-    and no texel covers more. A mesh counts by its geometric error; the original's distance is 0.
-    Raises ValueError for a mesh whose geometric error is not known.
+    and no texel covers more. A mesh counts by the level's geometric error, of which a hybrid's own
+    is a part; the original's distance is 0. Raises ValueError for a mesh whose geometric error is
+    not known.
     """
+    size, reach = np.zeros(0), np.zeros(0)
     if level.billboards is not None and level.atlas is not None:
         texel = _texel_size(level.billboards, level.atlas)
         size = np.maximum(level.billboards.half_depth, texel)
         reach = _reach(level.billboards, center)
-    else:
-        if level.mesh is None or level.geometric_error_m is None:
+    if level.mesh is not None:
+        if level.geometric_error_m is None:
             raise ValueError("distance_for_pixels: a mesh needs its geometric_error_m")
-        size = np.array([level.geometric_error_m[0]])
-        reach = np.linalg.norm(level.mesh.positions - center, axis=1).max(initial=0.0) + size
+        error = level.geometric_error_m[0]
+        farthest = np.linalg.norm(level.mesh.positions - center, axis=1).max(initial=0.0)
+        size, reach = np.append(size, error), np.append(reach, farthest + error)
 
     if not size.any():
         return 0.0

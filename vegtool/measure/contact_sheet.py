@@ -85,9 +85,12 @@ def _magnified(picture: ByteArray) -> ByteArray:
 def _caption(level: Level, number: int) -> list[tuple[str, tuple[int, int, int]]]:
     assert level.billboards is not None and level.atlas is not None
     height, width = level.atlas.color.shape[:2]
+    triangles = f"{level.triangles:,} triangles"
+    if level.mesh_triangles:
+        triangles += f" ({level.mesh_triangles:,} of a mesh)"
     lines = [
         (f"LOD{number}, from {level.near_distance_m:.3g} m", INK),
-        (f"{len(level.billboards):,} billboards, {level.triangles:,} triangles", FAINT),
+        (f"{len(level.billboards):,} billboards, {triangles}", FAINT),
         (f"atlas {width} x {height}", FAINT),
     ]
     if level.measured is not None:

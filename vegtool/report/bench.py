@@ -112,7 +112,7 @@ def _with_bounds(row: Row, bench: Bench, level: Level) -> Row:
     """The row with what formulas say of its level, at every size and of the worst view."""
     pixels = bench.options.max_pixels or TOLERATED_PIXELS
     plant, display = bench.plant, bench.options.display
-    if level.billboards is None and level.geometric_error_m is None:
+    if level.mesh is not None and level.geometric_error_m is None:
         return row
     row = replace(
         row,
