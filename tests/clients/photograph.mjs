@@ -1,7 +1,8 @@
 // three.js in headless Chromium: photographs .glb files as a stock client shows them.
-// stdin: {size, fov, jobs: [{file, center, radius, supersample, views: [{direction, distance}],
-//         out: [PNG path, one per view]}, ...]}
+// stdin: {size, fov, jobs: [{file, center, radius, supersample,
+//         views: [{direction, distance, sun}], out: [PNG path, one per view]}, ...]}
 //   size: pixels a side; supersample: times larger, to be averaged by the reader. distance: radii.
+//   sun: where from, [0.5, 1, 0.7] where it is left out.
 // stdout: one JSON object per line and job, {file, triangles, texels, complaints}.
 // 4x multisampling where nothing is supersampled, a sun and a sky, no tone mapping.
 import fs from 'node:fs';
@@ -19,7 +20,6 @@ const renderer = new THREE.WebGLRenderer(
 renderer.setPixelRatio(1);
 renderer.setClearColor(0x000000, 0);
 const sun = new THREE.DirectionalLight(0xffffff, 2.2);
-sun.position.set(0.5, 1, 0.7);
 let scene, camera, middle, scale;
 
 window.open3 = async ({url, center, radius}) => {
@@ -43,7 +43,8 @@ window.open3 = async ({url, center, radius}) => {
   return {triangles, texels};
 };
 
-window.shoot = ({direction, distance}, supersample) => {
+window.shoot = ({direction, distance, sun: from = [0.5, 1, 0.7]}, supersample) => {
+  sun.position.set(...from);
   renderer.setSize(${size} * supersample, ${size} * supersample);
   camera.position.copy(middle)
     .addScaledVector(new THREE.Vector3(...direction).normalize(), distance * scale);
