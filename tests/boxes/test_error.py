@@ -10,7 +10,7 @@ from box_cases import box_points, card, some_rotation
 from plants import plant_of
 
 from vegtool.boxes import BoxOptions, geometric_error, make_billboards
-from vegtool.boxes.error import surface_samples
+from vegtool.boxes.error import distance_to_mesh, surface_samples
 
 X, Y, Z = np.eye(3)
 
@@ -46,6 +46,43 @@ def test_of_crossed_planes_the_nearest_counts() -> None:
         crossed, center=crossed.center[shuffled], u=crossed.u[shuffled], v=crossed.v[shuffled]
     )
     assert geometric_error(plant, labels, other) == pytest.approx((worst, most))
+
+
+def test_what_a_mesh_shows_is_as_far_as_the_mesh() -> None:
+    """A card of a billboard of its own, one half a metre above a mesh, and one that nothing
+    shows."""
+    cards = [card(0 * X, X, Y), card(10 * X, X, Y), card(20 * X, X, Y)]
+    plant, mesh = plant_of(np.concatenate(cards)), plant_of(card(10 * X - 0.5 * Z, 2 * X, 2 * Y))
+    labels = np.array([0, 0, -1, -1, -1, -1], dtype=np.int32)
+    by_mesh = np.array([False, False, True, True, False, False])
+    billboards = make_billboards(plant_of(cards[0]), np.zeros(2, dtype=np.int32))
+    error = geometric_error(plant, labels, billboards, mesh, by_mesh)
+    assert error == pytest.approx((0.5, 0.5))
+    assert geometric_error(plant, labels, billboards) == pytest.approx((0, 0), abs=1e-12)
+    both = np.array([0, 0, 0, 0, -1, -1], dtype=np.int32)  # the nearer of the two counts
+    assert geometric_error(plant, both, billboards, mesh, by_mesh) == pytest.approx(
+        (0, 0), abs=1e-6
+    )
+    with pytest.raises(ValueError, match="nothing shows"):
+        geometric_error(plant, np.full(6, -1, np.int32), billboards)
+
+
+@pytest.mark.parametrize("offset", [0.0, 1e6])
+def test_distance_to_a_mesh_is_that_to_the_nearest_of_its_points(offset: float) -> None:
+    """The oracle has many points of every triangle, so it is too large by their spacing at most;
+    a triangle that is a line and one that is a point show nothing."""
+    rng = np.random.default_rng(1)
+    corners = rng.normal(size=(12, 3, 3))
+    corners[0, 2], corners[1] = corners[0, :2].mean(axis=0), corners[1, 0]
+    points = 2 * rng.normal(size=(200, 3))
+    a, b = (np.mgrid[:61, :61].reshape(2, -1).astype(float) / 60)[:, :, None]
+    inside = (a + b)[:, 0] <= 1 + 1e-9
+    many = [(p + a * (q - p) + b * (r - p))[inside] for p, q, r in corners[2:]]
+    gaps = points[:, None] - np.concatenate(many)
+    oracle = np.linalg.norm(gaps, axis=-1).min(axis=1)
+    found = distance_to_mesh(points + offset, plant_of(corners + offset))
+    assert (found <= oracle + 1e-9).all()
+    assert found == pytest.approx(oracle, abs=2e-2)
 
 
 def test_turned_scaled_plant_has_a_scaled_error() -> None:

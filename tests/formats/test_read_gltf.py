@@ -457,11 +457,11 @@ def test_material_factors(tmp_path: Path) -> None:
     assert old.base_color.tolist() == [0.5, 0.6, 0.7, 1] and old.metallic == 0
 
 
-def colored(tmp_path: Path, colors: np.ndarray, texture: bool) -> Plant:
+def colored(tmp_path: Path, colors: np.ndarray, texture: bool, uv: np.ndarray = QUAD_UV) -> Plant:
     made = Gltf()
     surface = {"baseColorTexture": {"index": made.image(png(SOLID))}} if texture else {}
     leaf = made.material(pbrMetallicRoughness=surface)
-    mesh = made.mesh(material=leaf, TEXCOORD_0=QUAD_UV, NORMAL=UP_NORMALS, COLOR_0=colors)
+    mesh = made.mesh(material=leaf, TEXCOORD_0=uv, NORMAL=UP_NORMALS, COLOR_0=colors)
     attribute = made.json["meshes"][mesh]["primitives"][0]["attributes"]["COLOR_0"]
     made.json["accessors"][attribute]["normalized"] = colors.dtype.kind == "u"
     made.node(mesh=mesh)
@@ -481,6 +481,8 @@ def test_wind_weights_are_no_colors(tmp_path: Path) -> None:
     plant = colored(tmp_path, weights, texture=True)
     assert plant.colors is None and any("wind" in note for note in plant.notes)
     assert colored(tmp_path, weights, texture=False).colors is not None  # painted by its vertices
+    still = np.full_like(QUAD_UV, 0.5)  # one texel for the whole face
+    assert colored(tmp_path, weights, texture=True, uv=still).colors is not None
     black = colored(tmp_path, np.zeros((4, 3), np.float32), texture=False)
     assert black.colors is None and any("black" in note for note in black.notes)
 

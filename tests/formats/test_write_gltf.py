@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from written import billboard_level, leafy_plant, parse, small_chain
+from written import billboard_level, hybrid_level, leafy_plant, parse, small_chain
 
 import vegtool
 from vegtool.errors import OutputError
@@ -22,7 +22,7 @@ from vegtool.formats.gltf import (
     screen_coverage,
     write_chain,
 )
-from vegtool.lod import Level, billboard_quads
+from vegtool.lod import Level, billboard_quads, level_triangles
 from vegtool.plant import Branches, Texture
 
 
@@ -218,6 +218,44 @@ def test_two_sided_levels_are_pairs_of_single_sided_quads():
     glb = parse(level_glb(billboard_level(2, double_sided=False), "x"))
     assert not glb.material()["doubleSided"]
     assert len(glb.primitive()["indices"]) == 2 * 12
+
+
+@pytest.mark.parametrize("double_sided", [True, False])
+def test_a_hybrid_is_one_primitive_with_one_material(double_sided):
+    level = hybrid_level(2, double_sided=double_sided)
+    glb, drawn = parse(level_glb(level, "oak_LOD1")), level_triangles(level)
+    assert len(glb.json["meshes"][0]["primitives"]) == len(glb.json["materials"]) == 1
+    assert glb.material()["alphaMode"] == "MASK"
+    assert glb.material()["doubleSided"] == double_sided
+    stored = glb.primitive()
+    assert set(stored) == {"POSITION", "NORMAL", "TANGENT", "TEXCOORD_0", "COLOR_0", "indices"}
+    assert len(stored["indices"]) == 3 * level.triangles
+    for name, values in (
+        ("POSITION", drawn.positions),
+        ("NORMAL", drawn.normals),
+        ("TANGENT", drawn.tangents),
+        ("TEXCOORD_0", drawn.uvs),
+    ):
+        assert np.array_equal(stored[name], values.astype(np.float32)), name
+    assert stored["COLOR_0"].dtype == np.uint16
+    assert np.allclose(stored["COLOR_0"] / 65535, drawn.colors, atol=0.5 / 65535)
+
+
+def test_billboards_alone_have_no_vertex_colours():
+    assert "COLOR_0" not in parse(level_glb(billboard_level(2), "x")).primitive()
+
+
+def test_a_hybrids_bounds_are_those_of_both_parts():
+    level = hybrid_level(1)
+    level = replace(level, mesh=replace(level.mesh, positions=level.mesh.positions + 1e4))
+    glb = parse(level_glb(level, "x"))
+    places = np.concatenate([billboard_quads(level).positions, level.mesh.positions])
+    middle = (places.min(axis=0) + places.max(axis=0)) / 2
+    assert "translation" not in glb.json["nodes"][0], "its origin lies between its parts"
+    far = replace(level.billboards, center=level.billboards.center + 2e5)
+    moved = replace(level.mesh, positions=level.mesh.positions + 2e5)
+    glb = parse(level_glb(replace(level, billboards=far, mesh=moved), "x"))
+    assert glb.json["nodes"][0]["translation"] == pytest.approx((middle + 2e5).tolist(), abs=0.1)
 
 
 def test_a_mesh_level_is_written_as_a_plant():

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import jsonschema
 import pytest
-from written import small_chain
+from written import hybrid_level, small_chain
 
 from vegtool.errors import InputError
 from vegtool.formats.gltf import screen_coverage, write_chain
@@ -22,6 +22,16 @@ FILES = [LevelFile("tree.glb", 300), LevelFile("tree_LOD1.glb", 200), LevelFile(
 def test_a_manifest_follows_its_schema():
     jsonschema.Draft202012Validator.check_schema(schema())
     jsonschema.validate(manifest(small_chain(), FILES), schema())
+
+
+def test_a_hybrid_level_counts_both_parts():
+    """Three billboards of two triangles, and two of wood; texels are the atlas's."""
+    chain = small_chain()
+    values = manifest(replace(chain, levels=(chain.levels[0], hybrid_level())), FILES[:2])
+    jsonschema.validate(values, schema())
+    level = values["levels"][1]
+    assert (level["kind"], level["billboards"], level["triangles"]) == ("hybrid", 3, 8)
+    assert level["texels"] == 2 * 24 * 32
 
 
 def test_levels_say_what_is_drawn_and_from_where():

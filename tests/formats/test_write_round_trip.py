@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from written import leafy_plant
+from written import hybrid_level, leafy_plant, small_chain
 
 from vegtool.formats import read_plant
-from vegtool.formats.gltf import plant_glb
+from vegtool.formats.gltf import chain_glb, level_glb, plant_glb
 from vegtool.growth import sample
+from vegtool.measure.pictures import client_plant
 from vegtool.plant import Plant
 
 
@@ -55,6 +57,34 @@ def test_writing_what_was_read_changes_nothing(tmp_path: Path):
     again = written_and_read(once, tmp_path)
     for name in ("positions", "normals", "uvs", "faces", "face_material"):
         assert np.array_equal(getattr(once, name), getattr(again, name)), name
+
+
+@pytest.mark.parametrize("double_sided", [True, False])
+def test_a_hybrid_is_read_back_as_what_is_measured(tmp_path: Path, double_sided):
+    """Its dark bark is no weights for wind: those faces show one place of the texture."""
+    level = hybrid_level(double_sided=double_sided)
+    mine, path = client_plant(level), tmp_path / "tree.glb"
+    path.write_bytes(level_glb(level, "tree"))
+    theirs = read_plant(path)
+    assert theirs.notes == ()
+    assert len(theirs.faces) == len(mine.faces) == level.triangles
+    for name, tolerance in (("positions", 1e-6), ("normals", 0), ("uvs", 1e-7), ("colors", 1e-5)):
+        expected, found = getattr(mine, name)[mine.faces], getattr(theirs, name)[theirs.faces]
+        assert np.allclose(expected, found, rtol=0, atol=tolerance), name
+    (asked,), (material,) = mine.materials, theirs.materials
+    for name in ("alpha_mode", "alpha_cutoff", "double_sided", "metallic", "roughness"):
+        assert getattr(material, name) == getattr(asked, name), name
+    for name in ("color_texture", "normal_texture"):
+        image, copy = getattr(asked, name), getattr(material, name)
+        assert np.array_equal(image.pixels, copy.pixels)
+
+
+def test_a_chain_with_a_hybrid_shows_the_original(tmp_path: Path):
+    """Readers that do not know MSFT_lod, ours among them, see the original alone."""
+    chain = small_chain()
+    path = tmp_path / "tree.glb"
+    path.write_bytes(chain_glb(replace(chain, levels=(chain.levels[0], hybrid_level()))))
+    assert len(read_plant(path).faces) == chain.levels[0].triangles
 
 
 def test_the_branches_of_a_sample_survive(tmp_path: Path):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import BytesIO
 from typing import Any
 
@@ -154,6 +154,46 @@ def billboard_level(
         double_sided=double_sided,
         near_distance_m=near,
     )
+
+
+BARK = np.array([0.1, 0.06, 0.02, 1.0])
+"""Linear, and dark as bark is; as a tint, its channels would be too unlike for a colour."""
+
+
+def wood() -> Plant:
+    """A square at z = 0.5, half of it single-sided bark, the other half a paler double-sided
+    ribbon; the corners that they share have one vertex each."""
+    corners, _ = upright_square(0.5)
+    shades = np.array([[0.5], [1.0], [0.7], [0.9]])
+    return Plant(
+        "wood",
+        corners,
+        np.tile([0.0, 0.0, 1.0], (4, 1)),
+        np.zeros((4, 2)),
+        np.array([[0, 1, 2], [0, 2, 3]]),
+        np.array([0, 1]),
+        (Material("bark"), Material("ribbon", base_color=[0.5, 0.5, 0.5, 1], double_sided=True)),
+        colors=shades * BARK,
+    )
+
+
+def hybrid_level(count: int = 3, near: float = 10.0, double_sided: bool = True) -> Level:
+    """The same billboards, on an atlas with a white block, and the wood."""
+    level = billboard_level(count, near, double_sided)
+    atlas = level.atlas
+    assert atlas is not None
+
+    def below(image: np.ndarray, value: int) -> np.ndarray:
+        return np.concatenate([image, np.full_like(image[:8], value)])
+
+    atlas = replace(
+        atlas,
+        color=below(atlas.color, 255),
+        normal=np.tile(np.array([128, 128, 255], np.uint8), (24, 32, 1)),
+        depth=below(atlas.depth, 0),
+        white=np.array([2, 18, 4, 4]),
+    )
+    return replace(level, kind="hybrid", mesh=wood(), atlas=atlas)
 
 
 def small_chain(**changes: Any) -> LodChain:

@@ -286,6 +286,21 @@ def test_a_mesh_counts_by_its_geometric_error() -> None:
         distance_for_pixels(Level("mesh", mesh=mesh), 0 * X, DISPLAY, 1.0)
 
 
+def test_a_hybrid_counts_by_both_of_its_parts() -> None:
+    """The billboard reaches 1.5 m and has a depth of half a metre; the mesh reaches 3 m."""
+    wood = replace(plant_of([[[3.0, 0, 0], [0, 3, 0], [0, 0, 3]]]), colors=np.ones((3, 4)))
+    made = level(billboard())
+    assert made.atlas is not None
+    atlas = replace(made.atlas, white=[0, 0, 4, 4])
+    mixed = replace(made, kind="hybrid", atlas=atlas, mesh=wood, geometric_error_m=(0.1, 0.0))
+    alone = distance_for_pixels(made, 0 * X, DISPLAY, 2.0)
+    assert distance_for_pixels(mixed, 0 * X, DISPLAY, 2.0) == pytest.approx(alone)
+    rough = replace(mixed, geometric_error_m=(1.0, 0.0))
+    assert distance_for_pixels(rough, 0 * X, DISPLAY, 2.0) == pytest.approx(4 + PC / 2)
+    with pytest.raises(ValueError, match="geometric_error_m"):
+        distance_for_pixels(replace(mixed, geometric_error_m=None), 0 * X, DISPLAY, 2.0)
+
+
 @pytest.mark.parametrize("shape", ["auto", "crossed"])
 def test_a_plant_is_displaced_by_no_more_than_the_bounds(shape: Shape) -> None:
     """Its boxes hold what they show: every plane of crossed ones answers for the whole cluster."""
