@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from baking_cases import billboards, leafy, picture, plain, quads, texture
 
-from vegtool.baking.bake import MOST_SAMPLES, BakeOptions, bake, fit, pairs
+from vegtool.baking.bake import MOST_SAMPLES, WHITE, BakeOptions, bake, fit, pairs, whiten
 from vegtool.errors import UsageError
 from vegtool.gl.context import describe
+from vegtool.gl.mipmaps import mip_levels
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Billboards
 from vegtool.plant import Material, Plant
@@ -304,6 +305,57 @@ def test_crossed_planes_each_show_the_whole_cluster():
     ]  # fmt: skip
 
 
+def test_faces_of_no_cluster_are_on_no_billboard():
+    face, shown_by = pairs(np.array([-1, 0, -1, 1]), np.array([1, 0]))
+    assert sorted(zip(face.tolist(), shown_by.tolist(), strict=True)) == [(1, 1), (3, 0)]
+
+
+@pytest.mark.parametrize("double_sided", ["double", "opposite"])
+def test_a_white_block_lies_beside_the_pictures_and_changes_none(double_sided):
+    plant = leafy(np.random.default_rng(8), 60)
+    labels = (np.arange(60) % 3).astype(np.int32)
+    planes = billboards([[0, 0, 0], [0.2, 0, 0], [0, 0.3, 0]], 1.2, 1.5)
+    options = BakeOptions(sides=double_sided)
+    plain_level = bake(plant, labels, planes, 20.0, options)
+    atlas = bake(plant, labels, planes, 20.0, options, white=True).atlas
+    assert plain_level.atlas.white is None
+    for which in ("front", "back"):
+        for index in range(3):
+            for mine, theirs in zip(
+                cut(atlas, index, which), cut(plain_level.atlas, index, which), strict=True
+            ):
+                np.testing.assert_allclose(mine, theirs, atol=1)  # it lies elsewhere
+    x, y, w, h = atlas.white
+    assert (w, h) == (WHITE, WHITE)
+    gutter = options.gutter
+    block = np.s_[y - gutter : y + h + gutter, x - gutter : x + w + gutter]
+    assert atlas.color[block].shape[:2] == (WHITE + 2 * gutter, WHITE + 2 * gutter)
+    assert (atlas.color[block] == 255).all()
+    assert (atlas.normal[block] == [128, 128, 255]).all()
+    assert not atlas.depth[block].any()
+    for px, py, pw, ph in np.concatenate([atlas.front, atlas.back]):
+        apart = px >= x + w + 2 * gutter or px + pw + 2 * gutter <= x
+        assert apart or py >= y + h + 2 * gutter or py + ph + 2 * gutter <= y
+
+
+@pytest.mark.parametrize("x", range(4))
+@pytest.mark.parametrize("y", [0, 1])
+def test_the_middle_of_a_white_block_is_white_in_the_first_mip_too(x, y):
+    """Bilinear filtering there takes the four texels around it; all else is black, so that none
+    of them may reach beyond the block. Its gutter is not counted on."""
+    color, normal = np.zeros((32, 32, 4), np.uint8), np.zeros((32, 32, 3), np.uint8)
+    whiten(color, normal, np.array([8 + x, 12 + y, WHITE, WHITE]), 0)
+    middle = np.array([12 + y, 8 + x]) + WHITE / 2
+    for level, image in enumerate([color, next(iter(mip_levels(color, True)))]):
+        low = middle / 2**level - 0.5
+        around = [
+            image[row, column]
+            for row in {int(np.floor(low[0])), int(np.ceil(low[0]))}
+            for column in {int(np.floor(low[1])), int(np.ceil(low[1]))}
+        ]
+        assert (np.array(around) == 255).all()
+
+
 def test_flat_and_line_like_clusters_bake_without_complaint():
     plant = quads([[0, 0, 0]])
     for half_size, half_depth in (((1.0, 1.0), 0.0), ((1.0, 0.0), 0.0), ((0.0, 0.0), 0.0)):
@@ -322,6 +374,16 @@ def test_density_is_lowered_to_fit_the_largest_texture():
     assert wide.width <= 2046
     with pytest.raises(UsageError, match="max-texture"):
         fit(np.full((200, 2), 1.0), 20.0, 2, 64)
+
+
+def test_a_white_block_counts_where_the_texture_is_small():
+    packing, density = fit(np.full((50, 2), 1.0), 20.0, 2, 64, blocks=1)
+    assert len(packing.rect) == 51
+    assert packing.rect[-1, 2:].tolist() == [WHITE, WHITE]
+    assert max(packing.width, packing.height) <= 64
+    assert 1 < density < 20
+    with pytest.raises(UsageError, match="max-texture"):
+        fit(np.full((200, 2), 1.0), 20.0, 2, 64, blocks=1)
 
 
 def test_inputs_are_left_as_they_were():

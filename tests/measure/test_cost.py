@@ -8,7 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hybrids import hybrid_of
 
+from vegtool.growth import sample
 from vegtool.lod import Level
 from vegtool.measure import cost as module
 from vegtool.measure.cost import FRAMES, cost, frame_time, peak_memory
@@ -66,6 +68,17 @@ def test_one_draw_call_per_material_and_what_the_level_says_of_itself() -> None:
     low, high = found.frame.quartiles_ms
     assert 0 < low <= found.frame.median_ms <= high
     assert cost(level, [camera()] * 7, [1024.0] * 7).frame.frames >= FRAMES
+
+
+@pytest.mark.gl
+def test_a_hybrid_is_one_draw_call_for_both_of_its_parts() -> None:
+    plant = sample("bush", 500)
+    level = hybrid_of(plant, 12, 20.0)
+    found = cost(level, [camera()], [1024.0])
+    assert level.billboards is not None and level.atlas is not None
+    assert (found.draw_calls, found.billboards) == (1, len(level.billboards))
+    assert found.triangles == (~plant.face_is_leaf).sum() + 2 * len(level.billboards)
+    assert found.texels == 2 * level.atlas.texels
 
 
 @pytest.mark.gl

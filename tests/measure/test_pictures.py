@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from io import BytesIO
+from pathlib import Path
 
 import numpy as np
 import pytest
 from golden_pictures import assert_golden
+from hybrids import hybrid_of
 from PIL import Image
 
 from vegtool.convert import ConvertOptions, convert
+from vegtool.formats import read_plant
+from vegtool.formats.gltf import level_glb
 from vegtool.gl.draw import Light
 from vegtool.gl.upload import PlantBuffers
 from vegtool.growth import sample
+from vegtool.lod import Atlas, Billboards, Display, Level
 from vegtool.measure.background import bytes_over
 from vegtool.measure.contact_sheet import contact_sheet
 from vegtool.measure.options import MeasureOptions
-from vegtool.measure.pictures import fragments, frame_seconds, live, truth
-from vegtool.measure.views import Camera, direction
+from vegtool.measure.pictures import client_plant, fragments, frame_seconds, live, truth
+from vegtool.measure.views import Camera, direction, framed
 from vegtool.plant import Material, Plant, Texture
 
 pytestmark = pytest.mark.gl
@@ -84,6 +90,61 @@ def test_the_truth_keeps_the_coverage_that_alpha_tested_mips_lose() -> None:
     with PlantBuffers(square(leaf), mipmaps=True) as buffers:
         assert live(buffers, front(), AMBIENT)[..., 3].sum() == 0
     assert nearest[16:48, 16:48, 3].mean() > 0.2
+
+
+def barky(double_sided: bool, material: Material) -> Level:
+    """A billboard out of view, on an atlas of noise, and a square of bark in front of the eye."""
+    noise = np.random.default_rng(3).integers(0, 256, (64, 64, 4), np.uint8)
+    noise[40:48, 20:28] = 255
+    normal = noise[..., :3] | np.array([0, 0, 128], np.uint8)
+    normal[40:48, 20:28] = (128, 128, 255)
+    picture = np.array([[2, 2, 30, 30]])
+    atlas = Atlas(noise, normal, np.zeros((64, 64)), picture, picture, [22, 42, 4, 4])
+    x, y, _ = np.eye(3)
+    plane = Billboards([[50.0, 0, 0]], x[None], y[None], [[0.5, 0.5]], [0.0], [0])
+    bark = replace(square(material), colors=np.tile([0.2, 0.1, 0.05, 1.0], (4, 1)))
+    return Level("hybrid", bark, plane, atlas, double_sided=double_sided)
+
+
+@pytest.mark.parametrize("pixels", [320.0, 40.0, 20.0])
+@pytest.mark.parametrize("anisotropy", [1, 4])
+def test_the_mesh_of_a_hybrid_has_its_own_colour_at_every_size(
+    pixels: float, anisotropy: int
+) -> None:
+    """32, 4 and 2 pixels across: mips of the noise would show long before. Where a client
+    culls, faces of double-sided wood are seen from behind all the same, and others are not."""
+    light = Light(direction=np.array([0.0, 0, 1]), sun=1.0, sky_above=0.0, sky_below=0.0)
+    for double_sided, both in ((True, False), (False, True), (False, False)):
+        level = barky(double_sided, Material("bark", double_sided=both))
+        with PlantBuffers(client_plant(level), mipmaps=True) as buffers:
+            assert len(buffers.groups) == 1
+            camera = replace(front(), focal_px=pixels)
+            picture = live(buffers, camera, light, anisotropy)
+            assert picture[..., 3].sum() == pytest.approx((pixels / 10) ** 2, abs=0.3)
+            shown = picture[..., :3].sum(axis=(0, 1)) / picture[..., 3].sum()
+            np.testing.assert_allclose(shown, [0.2, 0.1, 0.05], rtol=0.01)
+            back = live(buffers, replace(camera, direction=direction(180, 0)), AMBIENT, anisotropy)
+            assert back[..., 3].sum() == pytest.approx(
+                (pixels / 10) ** 2 * (double_sided or both), abs=0.3
+            )
+
+
+def test_a_hybrids_file_shows_what_is_measured(tmp_path: Path) -> None:
+    """The tree of the samples, its wood as a mesh: drawn from the level, and from its file as it
+    is read; a file's numbers have fewer digits, so that an edge may fall to the other side."""
+    plant = sample("broadleaf", 3000)
+    level = hybrid_of(plant, 60, 20.0)
+    path = tmp_path / "tree.glb"
+    path.write_bytes(level_glb(level, "tree"))
+    camera = framed(plant.center, plant.radius, direction(25, 8), 4 * plant.radius, Display())
+    with (
+        PlantBuffers(client_plant(level), mipmaps=True) as mine,
+        PlantBuffers(read_plant(path), mipmaps=True) as theirs,
+    ):
+        for anisotropy in (1, 4):
+            expected, found = (live(b, camera, None, anisotropy) for b in (mine, theirs))
+            assert expected[..., 3].sum() > 5000
+            assert np.mean(np.abs(expected - found).max(axis=2) > 2e-3) < 0.005
 
 
 def test_far_from_the_origin_the_picture_is_the_same() -> None:

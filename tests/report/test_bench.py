@@ -9,17 +9,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hybrids import hybrid_of
 from PIL import Image
 
 from vegtool.formats.gltf import level_glb
 from vegtool.gl.upload import PlantBuffers
 from vegtool.growth import sample
 from vegtool.lod import Level
+from vegtool.measure.bounds import distance_for_pixels
 from vegtool.measure.scores import scores
 from vegtool.plant import Plant
 from vegtool.progress import silent
 from vegtool.report.bench import Bench, measured, set_up
-from vegtool.report.entries import Entry, entries
+from vegtool.report.entries import Entry, Made, entries
 from vegtool.report.options import ReportOptions
 from vegtool.report.pictures import SIZES, of_truth, sizes_of
 from vegtool.report.rows import PlantReport, Report, Row
@@ -78,6 +80,24 @@ def test_bounds_are_of_billboards_and_fall_with_distance(made: dict[str, tuple[R
     live, _ = made["live"]
     assert live.projection_px == ()
     assert live.within_pixels_from_m == 0.0
+
+
+def test_a_hybrid_has_the_bounds_of_its_billboards_and_its_mesh(bench: Bench) -> None:
+    """Its distance is that of the worse part; without an error of the mesh there is none."""
+    level = hybrid_of(bench.plant, 30, 40.0)
+    for error, known in (((0.5, 0.1), True), (None, False)):
+        given = replace(level, geometric_error_m=error)
+        made = Made(given, given.triangles, given.texels, dict)
+        entry = Entry("hybrid 30", "hybrid", 30, None, lambda *_, made=made: made)
+        row, _ = measured(bench, entry, ())
+        assert row.cost.triangles == level.triangles
+        assert bool(row.bound_px) == known
+        if known:
+            assert row.within_pixels_from_m == distance_for_pixels(
+                given, bench.plant.center, OPTIONS.display, 1.0
+            )
+        else:
+            assert row.within_pixels_from_m is None
 
 
 def test_an_impostor_counts_with_all_its_frames(made: dict[str, tuple[Row, Any]]) -> None:
