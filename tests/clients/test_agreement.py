@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hybrids import hybrid_of
 from programs import MARKS, MODELS, node
 
 from vegtool.arrays import Picture
@@ -43,6 +44,7 @@ VIEWS = views("all", 4, 0.3)
 GRID = 16  # steps of a pixel on which Chromium's rasteriser puts vertices
 DISPLAY = Display()
 LIGHT = Light()
+DENSITY = 200.0  # texels along the longest extent, of a hybrid's atlas
 REAL = (
     "eztree_ash_small/eztree_ash_small.glb",
     "eztree_pine_medium/eztree_pine_medium.glb",
@@ -52,6 +54,11 @@ REAL = (
 )
 SAMPLES = ("broadleaf", "conifer", "palm")
 PLANTS = [name for name in REAL if (MODELS / name).exists()] or [f"sample {n}" for n in SAMPLES]
+HYBRIDS = PLANTS[:2]
+CASES = [
+    *(f"{name} {kind}" for name in PLANTS for kind in ("original", "level")),
+    *(f"{name} hybrid" for name in HYBRIDS),
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +74,7 @@ class Case:
 
 @pytest.fixture(scope="session")
 def cases(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[Case]]:
-    """All plants and their first levels, photographed by one browser."""
+    """All plants, their first levels and some hybrids, photographed by one browser."""
     folder = tmp_path_factory.mktemp("agreement")
     found: dict[str, list[Case]] = {}
     jobs = []
@@ -75,10 +82,12 @@ def cases(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[Case]]:
         real = not name.startswith("sample ")
         plant = read_plant(MODELS / name) if real else sample(name.removeprefix("sample "))
         chain = convert(plant, ConvertOptions(billboards=256, levels=1), MeasureOptions("off"))
-        level = chain.levels[1]
+        levels = {"level": chain.levels[1]}
+        if name in HYBRIDS:
+            levels["hybrid"] = hybrid_of(plant, 256, DENSITY / plant.extent)
         for kind, drawn, content in (
             ("original", plant, plant_glb(plant)),
-            ("level", client_plant(level), level_glb(level, plant.name)),
+            *((k, client_plant(v), level_glb(v, plant.name)) for k, v in levels.items()),
         ):
             file = folder / f"{number}_{kind}.glb"
             file.write_bytes(content)
@@ -133,7 +142,7 @@ def put(plant: Plant, buffers: PlantBuffers) -> None:
     buffers.vertices.write(vertex_data(plant, buffers.origin, buffers.scale).tobytes())
 
 
-@pytest.mark.parametrize("name", [f"{p} {kind}" for p in PLANTS for kind in ("original", "level")])
+@pytest.mark.parametrize("name", CASES)
 def test_three_shows_what_we_show(name: str, cases: dict[str, list[Case]]) -> None:
     flip: dict[str, list[float]] = {}
     bias = []

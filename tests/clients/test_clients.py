@@ -11,16 +11,19 @@ import json
 import struct
 import subprocess
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from hybrids import hybrid_of
 from programs import MARKS, MODELS, node
 
 from vegtool.formats import READERS
-from vegtool.growth import SAMPLES
+from vegtool.formats.gltf import write_chain
+from vegtool.growth import SAMPLES, sample
+from vegtool.lod import Display, Level, LodChain
 
 # A silhouette is a grid of cells, of which those count that are covered by a quarter at least: the
 # outline of a crown, not of each leaf. Four pixels to a cell make a plant about 250 pixels high,
@@ -92,9 +95,14 @@ def vegtool(*arguments: str | Path) -> str:
     return done.stdout
 
 
+HYBRIDS = {f"hybrid {sides}": sides == "double" for sides in ("double", "opposite")}
+"""Chains with a level of mesh and billboards, by whether it is double-sided."""
+FILES = [*SOURCES, *HYBRIDS]
+
+
 @pytest.fixture(scope="session")
 def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Written]:
-    """Every model, converted with all defaults by one command."""
+    """Every model, converted with all defaults by one command, and the hybrids."""
     folder = tmp_path_factory.mktemp("clients")
     paths: dict[str, Path] = {}
     for name, path in SOURCES.items():
@@ -104,7 +112,20 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Written]:
             vegtool("sample", sample, "-o", paths[name], "-q")
     printed = vegtool("convert", *paths.values(), "-o", folder / "out", "-j", "2", "--json", "-q")
     outcomes = {Path(outcome["source"]): outcome for outcome in json.loads(printed)}
-    return {name: _written(path, outcomes[path]) for name, path in paths.items()}
+    found = {name: _written(path, outcomes[path]) for name, path in paths.items()}
+    for name, double_sided in HYBRIDS.items():
+        found[name] = _hybrid(folder / name, double_sided)
+    return found
+
+
+def _hybrid(folder: Path, double_sided: bool) -> Written:
+    """A sample whose level has its wood as a mesh, as a chain of two."""
+    plant = sample("broadleaf", 4000)
+    level = replace(hybrid_of(plant, 256, 250 / plant.extent), double_sided=double_sided)
+    level = replace(level, near_distance_m=5 * plant.extent)
+    chain = LodChain(plant.name, (Level("mesh", mesh=plant), level), Display(), 0)
+    first, combined, _ = write_chain(chain, folder)
+    return Written(combined, combined, [first])
 
 
 def _written(source: Path, outcome: dict[str, Any]) -> Written:
@@ -130,7 +151,8 @@ def drawn(written: dict[str, Written]) -> dict[Path, dict[str, Any]]:
     jobs = []
     for name, each in written.items():
         center, radius = frame(each.combined)
-        originals = [each.combined, *([each.source] if stands_for_itself(SOURCES[name]) else [])]
+        own = stands_for_itself(SOURCES.get(name))
+        originals = [each.combined, *([each.source] if own else [])]
         for file in (*originals, *each.levels):
             pixels = PIXELS_OF_ORIGINAL if file in originals else PIXELS_OF_LEVEL
             jobs.append({"file": str(file), "center": center, "radius": radius, "pixels": pixels})
@@ -163,7 +185,7 @@ def overlap(original: np.ndarray, other: np.ndarray) -> np.ndarray:
     return (original & other).sum(axis=(1, 2)) / (original | other).sum(axis=(1, 2))
 
 
-@pytest.mark.parametrize("source", SOURCES)
+@pytest.mark.parametrize("source", FILES)
 def test_the_validator_finds_no_error_and_no_warning(source, written, validated):
     for file in written[source].files:
         answer = validated[file]
@@ -172,7 +194,7 @@ def test_the_validator_finds_no_error_and_no_warning(source, written, validated)
         assert answer["errors"] == answer["warnings"] == 0
 
 
-@pytest.mark.parametrize("source", SOURCES)
+@pytest.mark.parametrize("source", FILES)
 def test_three_opens_and_draws_every_file(source, written, drawn):
     area = drawn[written[source].combined]["silhouettes"].sum(axis=(1, 2))
     seen = area >= LEAST_AREA
@@ -185,7 +207,7 @@ def test_three_opens_and_draws_every_file(source, written, drawn):
         assert cover.mean() >= LEAST_COVER, (file.name, cover)
 
 
-@pytest.mark.parametrize("source", SOURCES)
+@pytest.mark.parametrize("source", FILES)
 def test_level_1_has_the_silhouette_of_the_original(source, written, drawn):
     original, first = written[source].combined, written[source].levels[0]
     shares = overlap(drawn[original]["silhouettes"], drawn[first]["silhouettes"])
