@@ -8,13 +8,14 @@ import shutil
 import struct
 import subprocess
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from math import radians, tan
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
 from judge.photographs import FOV_DEG, SIZE
+from vegtool.convert import ConvertOptions
 from vegtool.formats.manifest import read_manifest
 
 DISTANCES = (2.9, 5.8, 11.6)
@@ -71,6 +72,11 @@ def converted(model: Path, folder: Path, options: str) -> Chain:
     if done.returncode:
         raise SystemExit(f"vegtool convert {model} {options}: {done.stderr.strip()}")
     return Chain(folder, read_manifest(folder / f"{model.stem}.lod.json"), options, seconds)
+
+
+def can_be_plain() -> bool:
+    """Whether this vegtool has another method than the plain one."""
+    return any(field.name == "refine" for field in fields(ConvertOptions))
 
 
 def limits(triangles: int) -> list[int]:
