@@ -1,0 +1,31 @@
+"""A level drawn as the plainest client draws it: what coverage and colour are measured by.
+
+No anisotropic filtering: three.js and most others come without, and mips lose most there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from vegtool.arrays import Picture
+from vegtool.gl.draw import Light
+from vegtool.gl.upload import PlantBuffers
+from vegtool.lod import Level
+from vegtool.measure.pictures import client_plant, live
+from vegtool.measure.views import Camera
+
+
+def drawn(
+    level: Level, cameras: Sequence[Camera], lights: Sequence[Light], anisotropy: int = 1
+) -> tuple[Picture, ...]:
+    """The level from each camera under the light of the same index, as `measure.pictures.live`
+    draws it; linear, premultiplied by coverage.
+
+    Raises ValueError for another number of lights than of cameras, and CapabilityError where
+    OpenGL cannot draw.
+    """
+    with PlantBuffers(client_plant(level), mipmaps=True) as buffers:
+        return tuple(
+            live(buffers, camera, light, anisotropy)
+            for camera, light in zip(cameras, lights, strict=True)
+        )
