@@ -23,7 +23,7 @@ from vegtool.formats import read_plant
 from vegtool.formats.gltf import plant_glb
 from vegtool.plant import Plant
 
-VIEWS = {"standard": STANDARD, "held out": HELD_OUT}
+VIEWS = {"standard": STANDARD, "held-out": HELD_OUT}
 
 
 @dataclass(frozen=True, eq=False)
