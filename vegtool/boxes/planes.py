@@ -35,16 +35,25 @@ def oriented_planes(corners: FloatArray, cluster: IntArray, count: int) -> Boxes
     the longer and the shorter side of the rectangle of least area around the faces' projection.
     A cluster without faces gets a box of no size at the origin.
     """
+    groups = Groups(cluster)
+    normal = np.empty((0, 3))
+    if len(corners):
+        normal = plane_normals(localised(corners, groups)[1], groups)
+    return boxes_about(corners, groups, normal, count)
+
+
+def boxes_about(corners: FloatArray, groups: Groups, normal: FloatArray, count: int) -> Boxes:
+    """A box per cluster whose third axis is the given normal.
+
+    corners: (f, 3, 3) metres. groups: the clusters, 0..count-1, of the faces. normal: (g, 3) unit
+    vectors of those that have faces. The first two axes are as of `oriented_planes`.
+    """
     center, half = np.zeros((count, 3)), np.zeros((count, 3))
     axes = np.tile(np.eye(3), (count, 1, 1))
     if not len(corners):
         return Boxes(center, axes, half)
-    groups = Groups(cluster)
-    origin = corners[groups.order[groups.starts[:-1]], 0]
-    local = np.ascontiguousarray(corners[groups.order].transpose(2, 1, 0))  # axis, corner, face
-    for axis, row in enumerate(local):
-        row -= groups.spread(origin[:, axis])
-    frames = frames_about(plane_normals(local, groups))
+    origin, local = localised(corners, groups)
+    frames = frames_about(normal)
     low, high = np.empty((len(groups), 3)), np.empty((len(groups), 3))
     side = np.empty((len(groups), 2))
     for i, part in enumerate(groups.slices()):
@@ -56,6 +65,16 @@ def oriented_planes(corners: FloatArray, cluster: IntArray, count: int) -> Boxes
     center[here] = origin + np.einsum("gi,gij->gj", (low + high) / 2, frames)
     axes[here], half[here] = longer_first(frames, (high - low) / 2)
     return Boxes(center, axes, half)
+
+
+def localised(corners: FloatArray, groups: Groups) -> tuple[FloatArray, FloatArray]:
+    """Origin (g, 3) of each group, its first corner, and coordinates from there, sorted by group:
+    (axis, corner, face)."""
+    origin = corners[groups.order[groups.starts[:-1]], 0]
+    local = np.ascontiguousarray(corners[groups.order].transpose(2, 1, 0))
+    for axis, row in enumerate(local):
+        row -= groups.spread(origin[:, axis])
+    return origin, local
 
 
 def plane_normals(local: FloatArray, groups: Groups) -> FloatArray:

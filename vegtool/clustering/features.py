@@ -53,18 +53,27 @@ def face_features(plant: Plant, orientation_scale: float) -> FloatArray:
     Center and radius are those of the plant's bounds in its own frame. Features are multiples of
     SAME, so that rounding does not decide between points that are equally near.
     """
+    corners, axes = own_corners(plant)
+    position = corners.mean(axis=1)
     scale = plant.radius or 1.0
-    corners = (plant.corners - plant.center) / scale
-    axes = frame(corners.mean(axis=1), face_weights(plant))
-    corners = np.einsum("fci,ai->fca", corners, axes)
-    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
-    radius = float(np.linalg.norm(high - low)) / 2
-    position = (corners.mean(axis=1) - (low + high) / 2) / (radius or 1.0)
     x, y, z = np.einsum("fi,ai->af", unit(plant.face_area_vectors / scale**2), axes)
     root2 = sqrt(2)
     tensor = np.stack([x * x, y * y, z * z, root2 * x * y, root2 * x * z, root2 * y * z], axis=1)
     features = np.concatenate([position, orientation_scale * tensor], axis=1)
     return np.asarray(np.round(features / SAME) * SAME)
+
+
+def own_corners(plant: Plant) -> tuple[FloatArray, FloatArray]:
+    """(f, 3, 3) plant radii: the faces' corners in the plant's own frame; and (3, 3) its axes.
+
+    Center and radius are those of the plant's bounds in that frame.
+    """
+    corners = (plant.corners - plant.center) / (plant.radius or 1.0)
+    axes = frame(corners.mean(axis=1), face_weights(plant))
+    corners = np.einsum("fci,ai->fca", corners, axes)
+    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+    radius = float(np.linalg.norm(high - low)) / 2
+    return (corners - (low + high) / 2) / (radius or 1.0), axes
 
 
 def frame(points: FloatArray, weights: FloatArray) -> FloatArray:
