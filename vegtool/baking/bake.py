@@ -97,7 +97,7 @@ def bake(
         front = packing.rect[: len(billboards)]
         back = front.copy()
         back[behind] = packing.rect[len(billboards) : len(which)]
-        color, normal = dilated(drawn, packing)
+        color, normal = dilated(drawn, packing, options.fit_alpha)
         block = packing.rect[-1] if white else None
         if block is not None:
             whiten(color, normal, block, options.gutter)
@@ -172,12 +172,14 @@ def supersample(packing: Packing, options: BakeOptions) -> int:
     return max(options.supersample, min(MOST_SAMPLES, cheap))
 
 
-def dilated(drawn: Drawn, packing: Packing) -> tuple[ByteArray, ByteArray]:
-    """Colour and normals carried under alpha 0; alpha such that what is covered passes the test."""
+def dilated(drawn: Drawn, packing: Packing, fit_alpha: bool = True) -> tuple[ByteArray, ByteArray]:
+    """Colour and normals carried under alpha 0; alpha such that what is covered passes the test, or
+    as drawn."""
     covered = drawn.color[..., 3] > 0
     nearest = nearest_covered(covered, packing.rect, packing.gutter)
     color = drawn.color.reshape(-1, 4)[nearest]
-    color[..., 3] = coverage_kept(drawn.color[..., 3], packing.rect, packing.gutter)
+    alpha = drawn.color[..., 3]
+    color[..., 3] = coverage_kept(alpha, packing.rect, packing.gutter) if fit_alpha else alpha
     return color, drawn.normal.reshape(-1, 3)[nearest]
 
 
