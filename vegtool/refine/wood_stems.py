@@ -12,21 +12,27 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from vegtool.arrays import FloatArray, IntArray
+from vegtool.arrays import FloatArray, IntArray, unit
 from vegtool.branches.axes import axes_of
 from vegtool.branches.join import join_tubes
-from vegtool.branches.parts import connected_parts
-from vegtool.branches.skeleton import Skeleton, skeleton
-from vegtool.branches.tubes import Tubes, cut_tubes
+from vegtool.branches.parts import Parts, connected_parts, weld
+from vegtool.branches.skeleton import skeleton
+from vegtool.branches.tubes import cut_tubes
 from vegtool.plant import Plant
 from vegtool.refine.wood_color import face_colors
-
-Ints = npt.NDArray[np.int64]
+from vegtool.refine.wood_lines import Ints, Lines, lines_of, uneven
+from vegtool.refine.wood_lumps import Lump, Surface, lumps
+from vegtool.refine.wood_shadow import Shadows
 
 LEAST_RATIO, MOST_RATIO = 0.1, 10.0
 """Of a stretch's surface to that of a round taper between its rings."""
+ROUGH = 0.05
+"""Of the radius: parts of the wood that are rougher are no stems,"""
+MATTERS = 0.02
+"""if they are so much of all wood's surface at least."""
+FACES_PER_PART = 6
+"""The least of a tube. Where parts have fewer on average, faces were parted from each other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,12 +53,22 @@ class Spans:
 
 
 @dataclass(frozen=True, eq=False)
+class Solid:
+    """Wood that is not round. stems: (m,) those of it. lumps: its surface with ever less
+    triangles."""
+
+    stems: Ints
+    lumps: tuple[Lump, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class Stems:
     """The wood of a plant as stems, t of them, with n nodes, one stem's after the other's.
 
     Lengths are in units of `radius` metres about `center`, (3,) metres. node: (n, 3). girth: (n,)
     perimeter. area: (n,) surface between the node before and this one, 0 at a stem's first. color:
-    (n, 4) linear, of that surface. stem: (n,). first, last: (t,) nodes. host: (t,) the stem it
+    (n, 3) linear, times that surface. swing: (n, 3, 3) the same times where on the stem it is, as
+    unit vectors from its axis, the last index: the first harmonic of the colour around it. stem: (n,). first, last: (t,) nodes. host: (t,) the stem it
     grows from, -1 for none. host_node, host_part: (t,) where: at that node of the host, or before
     it by (1 - part) of the way from the node before. spans: where the stems bend.
     """
@@ -63,13 +79,16 @@ class Stems:
     girth: FloatArray
     area: FloatArray
     color: FloatArray
+    swing: FloatArray
     stem: Ints
     first: Ints
     last: Ints
     host: Ints
     host_node: Ints
     host_part: FloatArray
+    rough: FloatArray
     spans: Spans
+    solids: tuple[Solid, ...]
 
     def __len__(self) -> int:
         return len(self.first)
@@ -83,134 +102,100 @@ def stems_of(plant: Plant, faces: IntArray) -> Stems | None:
     used = plant.corners[faces].reshape(-1, 3)
     low, high = used.min(axis=0), used.max(axis=0)
     center, radius = (low + high) / 2, float(np.linalg.norm(high - low) / 2)
-    vertices, corner = np.unique(plant.faces[faces], return_inverse=True)
-    local = (plant.positions[vertices] - center) / radius
-    parts = connected_parts(np.clip(local, -1, 1), corner.reshape(-1, 3).astype(np.int64))
+    parts = parts_of(plant, faces, center, radius)
     rings = skeleton(parts)
     tubes = cut_tubes(rings)
-    ring, stem, place = chains(rings, tubes)
-    node, girth = rings.center[ring], 2 * np.pi * rings.radius[ring]
-    first, last = ends(stem)
-    lonely = first == last
-    if lonely.any():
-        ring, stem, place, node, girth = stretched(
-            rings, parts.positions, ring, stem, place, node, girth, first[lonely]
-        )
-        first, last = ends(stem)
-    forked = np.flatnonzero(tubes.fork >= 0)
-    girth[first[forked]] = girth[first[forked] + 1]
+    lines = lines_of(parts, rings, tubes)
+    corners, area = parts.positions[parts.faces], plant.face_areas[faces] / radius**2
+    color = face_colors(plant, faces)
 
-    owner = rings.vertex_ring[parts.faces]
-    owner = place[owner[np.arange(len(faces)), rings.hop[owner].argmax(axis=1)]]
-    owner = np.where(owner == first[stem[owner]], owner + 1, owner)
-    face_area = plant.face_areas[faces] / radius**2
-    area = np.bincount(owner, face_area, len(node))
-    shown = face_colors(plant, faces)
-    color = np.stack(
-        [np.bincount(owner, face_area * shown[:, i], len(node)) for i in range(shown.shape[1])], 1
-    )
-    girth = true_girth(node, girth, area, stem)
-    host, host_node, host_part = hosts(rings, tubes, place, node, stem, first, last)
-    spans = halved(node, girth, first, last)
+    rough = uneven(parts, rings, tubes)
+    tube_part = rings.part[tubes.start]
+    surface = Surface(parts.positions, parts.faces, color, lines.node)
+    solid = []
+    for part in rough_parts(lines, area, rough, tube_part):
+        stems, own = np.flatnonzero(tube_part == part), parts.face_part == part
+        found = lumps(surface.of(own))
+        if found:
+            shadows = Shadows.around(corners[own])
+            covered = float(shadows.of(corners[own]).sum() * shadows.cell)
+            area = np.where(own, area * 4 * covered / area[own].sum(), area)
+            solid.append(Solid(stems, found))
+    host, host_node, host_part = hosts(lines, join_tubes(rings, tubes, axes_of(rings, tubes)))
+    first, last = lines.ends()
+    surface_of = np.bincount(lines.owner, area, len(lines.node))
+    light, swing = colors(lines, corners.mean(axis=1), color * area[:, None])
+    girth = true_girth(lines, surface_of)
     return Stems(
-        center, radius, node, girth, area, color, stem, first, last, host, host_node, host_part,
-        spans,
+        center, radius, lines.node, girth, surface_of, light, swing, lines.line, first, last,
+        host, host_node, host_part, rough, halved(lines.node, girth, first, last), tuple(solid),
     )  # fmt: skip
 
 
-def ends(stem: Ints) -> tuple[Ints, Ints]:
-    """First and last place of each of the stems that (n,) ordered labels tell."""
-    count = np.bincount(stem)
-    last = np.cumsum(count) - 1
-    return last - count + 1, last
+def parts_of(plant: Plant, faces: IntArray, center: FloatArray, radius: float) -> Parts:
+    """The connected parts of faces, in units of the stems; of flat-shaded models, whose faces share
+    no vertices, by position."""
+    vertices, corner = np.unique(plant.faces[faces], return_inverse=True)
+    local = np.clip((plant.positions[vertices] - center) / radius, -1, 1)
+    corner = corner.reshape(-1, 3).astype(np.int64)
+    parts = connected_parts(local, corner)
+    if len(faces) < FACES_PER_PART * parts.count:
+        parts = connected_parts(local, first_alike(weld(local))[corner])
+    return parts
 
 
-def chains(rings: Skeleton, tubes: Tubes) -> tuple[Ints, Ints, Ints]:
-    """The longest chain of rings in each tube: (n,) rings and (n,) their tubes, tube by tube from
-    its start on, after the ring of another that it forks from; and (r,) on which of these n each
-    ring of the wood hangs."""
-    order = np.lexsort((tubes.along, tubes.ring_tube))
-    walk = order[np.cumsum(np.bincount(tubes.ring_tube, minlength=len(tubes))) - 1]
-    starts = np.zeros(len(rings.parent), dtype=bool)
-    starts[tubes.start] = True
-    on_chain = starts.copy()
-    while len(walk):
-        on_chain[walk] = True
-        walk = rings.parent[walk[~starts[walk]]]
-    own = np.flatnonzero(on_chain)
-    forked = np.flatnonzero(tubes.fork >= 0)
-    ring = np.append(own, tubes.fork[forked])
-    tube = np.append(tubes.ring_tube[own], forked)
-    order = np.lexsort((rings.hop[ring], tube))
-    ring, tube, is_own = ring[order], tube[order], order < len(own)
-    place = np.full(len(rings.parent), -1)
-    place[ring[is_own]] = np.flatnonzero(is_own)
-    hangs = np.where(on_chain, np.arange(len(on_chain)), rings.parent)
-    while not on_chain[hangs].all():
-        hangs = np.where(on_chain[hangs], hangs, rings.parent[hangs])
-    return ring, tube, place[hangs]
+def first_alike(labels: Ints) -> Ints:
+    """(n,) for each label the first place that has it."""
+    _, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
+    return np.asarray(first[inverse])
 
 
-def stretched(
-    rings: Skeleton,
-    positions: FloatArray,
-    ring: Ints,
-    stem: Ints,
-    place: Ints,
-    node: FloatArray,
-    girth: FloatArray,
-    lonely: Ints,
-) -> tuple[Ints, Ints, Ints, FloatArray, FloatArray]:
-    """The chains, where those of one node, at places `lonely`, are given a second one: they reach
-    from their farthest vertex through their middle and as far again."""
-    away = np.linalg.norm(positions - rings.center[rings.vertex_ring], axis=1)
-    order = np.lexsort((away, rings.vertex_ring))
-    farthest = order[np.cumsum(np.bincount(rings.vertex_ring)) - 1]
-    tip = positions[farthest[ring[lonely]]]
-    node = node.copy()
-    node[lonely] = 2 * node[lonely] - tip
-    order = np.argsort(np.append(stem, stem[lonely]), kind="stable")
-    new_place = np.empty(len(order), dtype=np.int64)
-    new_place[order] = np.arange(len(order))
-    return (
-        np.append(ring, ring[lonely])[order],
-        np.append(stem, stem[lonely])[order],
-        new_place[place],
-        np.concatenate([node, tip])[order],
-        np.append(girth, girth[lonely])[order],
-    )
+def rough_parts(lines: Lines, area: FloatArray, rough: FloatArray, part: Ints) -> Ints:
+    """Parts of the wood that are no tubes and large enough to matter, rough: (t,) by line."""
+    on_line = np.bincount(lines.line[lines.owner], area, len(rough))
+    thick = np.bincount(lines.line, lines.girth) / np.bincount(lines.line) / (2 * np.pi)
+    part_area = np.bincount(part, on_line)
+    not_round = np.bincount(part, on_line * rough) > ROUGH * np.bincount(part, on_line * thick)
+    return np.flatnonzero(not_round & (part_area > MATTERS * part_area.sum()))
 
 
-def true_girth(node: FloatArray, girth: FloatArray, area: FloatArray, stem: Ints) -> FloatArray:
-    """Girths (n,) that give the tapers between nodes the surface that stands there."""
-    inner = stem[1:] == stem[:-1]
-    length = np.linalg.norm(np.diff(node, axis=0), axis=1)
+def colors(lines: Lines, middle: FloatArray, color: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(n, 3) sums of colours (f, 3) of faces with their middles (f, 3), and (n, 3, 3) sums of each
+    times the side of the line that it is on."""
+    node, owner = lines.node, lines.owner
+    axis = unit(node[owner] - node[owner - 1])
+    away = middle - node[owner]
+    side = unit(away - (away * axis).sum(axis=1)[:, None] * axis)
+    total = np.stack([np.bincount(owner, c, len(node)) for c in color.T], axis=1)
+    swing = [[np.bincount(owner, c * d, len(node)) for d in side.T] for c in color.T]
+    return total, np.moveaxis(np.array(swing), 2, 0)
+
+
+def true_girth(lines: Lines, area: FloatArray) -> FloatArray:
+    """Girths (n,) that give the tapers between nodes the surface that stands there, area (n,)."""
+    girth, inner = lines.girth, lines.line[1:] == lines.line[:-1]
+    length = np.linalg.norm(np.diff(lines.node, axis=0), axis=1)
     taper = np.where(inner, (girth[1:] + girth[:-1]) / 2 * length, 0.0)
-    before, after = np.append(0.0, taper), np.append(taper, 0.0)
+    around = np.append(0.0, taper) + np.append(taper, 0.0)
     there = area + np.append(np.where(inner, area[1:], 0.0), 0.0)
-    ratio = np.divide(there, before + after, out=np.ones_like(girth), where=before + after > 0)
+    ratio = np.divide(there, around, out=np.ones_like(girth), where=around > 0)
     return np.asarray(girth * np.clip(ratio, LEAST_RATIO, MOST_RATIO))
 
 
-def hosts(
-    rings: Skeleton, tubes: Tubes, place: Ints, node: FloatArray, stem: Ints, first: Ints,
-    last: Ints,
-) -> tuple[Ints, Ints, FloatArray]:  # fmt: skip
-    """(t,) each: the stem that a stem grows from, and where on it."""
-    host = join_tubes(rings, tubes, axes_of(rings, tubes))
+def hosts(lines: Lines, host: Ints) -> tuple[Ints, Ints, FloatArray]:
+    """(t,) each: the stem that a stem grows from, and where on it, nearest to its start."""
+    node = lines.node
+    first, last = lines.ends()
     host_node, host_part = np.full(len(host), -1), np.ones(len(host))
-    forked = tubes.fork >= 0
-    host_node[forked] = place[tubes.fork[forked]]
-    joined = np.flatnonzero((host >= 0) & ~forked)
+    joined = np.flatnonzero(host >= 0)
     size = (last - first)[host[joined]]
     child = np.repeat(joined, size)
     end = np.arange(len(child)) - np.repeat(np.cumsum(size) - size, size)
     end += first[host[child]] + 1
-    line = node[end] - node[end - 1]
-    square = np.maximum((line**2).sum(axis=1), np.finfo(float).tiny)
-    part = ((node[first[child]] - node[end - 1]) * line).sum(axis=1) / square
-    part = np.clip(part, 0, 1)
-    gap = np.linalg.norm(node[end - 1] + part[:, None] * line - node[first[child]], axis=1)
+    step = node[end] - node[end - 1]
+    square = np.maximum((step**2).sum(axis=1), np.finfo(float).tiny)
+    part = np.clip(((node[first[child]] - node[end - 1]) * step).sum(axis=1) / square, 0, 1)
+    gap = np.linalg.norm(node[end - 1] + part[:, None] * step - node[first[child]], axis=1)
     order = np.lexsort((gap, child))
     best = order[np.searchsorted(child[order], joined)]
     host_node[joined], host_part[joined] = end[best], part[best]
