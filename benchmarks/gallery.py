@@ -41,7 +41,7 @@ FRAME = 6
 """Pixels around the plant, nearest by, on each side."""
 GAP, LITTLE, HEAD, LINE = 14, 6, 72, 23
 PAPER, INK, FAINT = (250, 250, 248), (30, 34, 38), (100, 106, 112)
-QUALITY = 86
+QUALITY = 75
 """Of a JPEG."""
 
 

@@ -30,8 +30,9 @@ def wanted(words: Sequence[str], quick: bool, folder: Path) -> dict[str, Path]:
     there = {name: models / file for name, file in MODELS.items() if (models / file).exists()}
     if not there:
         for name in SAMPLES:
-            there[name] = folder / f"{name}.glb"
-            there[name].write_bytes(plant_glb(sample(name)))
+            file = folder / f"{name}-sample.glb"
+            file.write_bytes(plant_glb(sample(name)))
+            there[file.stem] = file
     found = {}
     for word in words:
         file = Path(word)
