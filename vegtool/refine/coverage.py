@@ -1,0 +1,233 @@
+"""Alpha of a level's pictures such that a stock client covers as much as the truth does.
+
+A client averages alpha into mips, interpolates it between texels and mips, and tests the result
+once per pixel. It takes the mip by the longer side of the pixel's footprint, so a billboard seen
+obliquely is sampled from mips far coarser than its distance asks for, and loses most of what is
+finer than a few texels. After Castano, "Computing alpha mipmaps" (2010), but over all views and
+distances at which a level is seen rather than mip by mip: each picture gets one threshold, such
+that the area which passes, expected over directions (by the area that they see) and over
+distances, is what the picture covers.
+
+Alpha as baked, the mean coverage of a texel, ranks texels: what is covered most passes first.
+Where nothing is covered the nearer to the shape, and where all is covered the farther from its
+edge, so that shapes grow and shrink by their outline and holes stay holes. Ranks are mapped to
+alpha linearly, which interpolation and averaging keep: so all that a client will ever sample can be
+ranked as it would be, and a histogram of that gives every threshold at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import distance_transform_edt
+
+from vegtool.arrays import ByteArray, FloatArray, IntArray, SingleArray
+from vegtool.baking.coverage import owners
+from vegtool.lod import Atlas, Level
+
+PASS = 127.5
+"""Alpha of 255 at the client's cutoff."""
+STEP = 4.0
+"""Ranks, of 255, per texel of distance from the outline of a shape."""
+FARTHEST = 4
+"""Texels by which a shape may grow or shrink."""
+MIPS = np.arange(0.0, 5.01, 0.5)
+"""Between which a client's are interpolated here."""
+SAMPLES = 1_500_000
+"""That rank all that a client samples of an atlas, as near as whole samples per texel allow."""
+MOST_SAMPLES = 4
+"""Per axis and texel."""
+ANGLES, TURNS, DISTANCES = 64, 8, 9
+"""Samples of the directions and distances from which a billboard is seen."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ranks:
+    """Ranks of the texels of p pictures, 0 to 255 and beyond.
+
+    rank: (h, w), gutters included. owner: (h, w) int32 picture of each texel, and `grown` the same
+    with gutters; -1 for none. covered, area: (p,) texels.
+    """
+
+    rank: SingleArray
+    owner: IntArray
+    grown: IntArray
+    covered: FloatArray
+    area: FloatArray
+
+
+def unbiased_alpha(
+    alpha: ByteArray,
+    rects: IntArray,
+    gutter: int,
+    density: float = 1.0,
+    reach: float = 2.0,
+    factor: npt.ArrayLike = 1.0,
+) -> ByteArray:
+    """(h, w) uint8: alpha of an atlas of which as much passes a client's test as is covered.
+
+    alpha: (h, w) uint8, mean coverage of each texel, as baked with `fit_alpha=False`. rects: (p, 4)
+    int32 x0, y0, width, height of the pictures, each once; `gutter` texels around each are its own.
+    density: texels per pixel, seen from in front at the near end. reach: the far end over the near
+    one. factor: (p,) or one for all, how many times its own coverage a picture is to show. Pictures
+    that are all empty or all covered stay as they are, and so does what lies outside them.
+    """
+    ranks = ranked(alpha, rects, gutter)
+    target = np.minimum(ranks.covered * np.asarray(factor, dtype=np.float64), ranks.area)
+    threshold = thresholds(ranks, target, seen_at(density, reach))
+    return mapped(alpha, ranks, threshold)
+
+
+def with_alpha(level: Level, alpha: ByteArray) -> Level:
+    """The level with that alpha, (h, w) uint8, in its atlas."""
+    assert level.atlas is not None
+    color = np.concatenate([level.atlas.color[..., :3], alpha[..., None]], axis=2)
+    return replace(level, atlas=replace(level.atlas, color=color))
+
+
+def pictures(atlas: Atlas) -> IntArray:
+    """(p, 4) int32 all rectangles with pictures, each once."""
+    return np.unique(np.concatenate([atlas.front, atlas.back]), axis=0).astype(np.int32)
+
+
+def ranked(alpha: ByteArray, rects: IntArray, gutter: int) -> Ranks:
+    """Texels ranked by how much of them is covered, then by their distance from the outline."""
+    owner = owners(alpha.shape, rects)
+    inside = owner >= 0
+    coverage = np.where(inside, alpha, 0).astype(np.float32)
+    rank = coverage.copy()
+    # pictures lie apart by their gutters: no nearer than FARTHEST texels does another one count
+    empty, full = inside & (alpha == 0), inside & (alpha == 255)
+    far = np.float32(FARTHEST + 1)
+    if empty.any():
+        rank -= STEP * np.minimum(_distance(coverage == 0), far) * empty
+    if full.any():
+        rank += STEP * np.minimum(_distance(~inside | full), far) * full
+    grown = owner.copy()
+    for index, (x, y, w, h) in enumerate(rects.tolist()):
+        around = np.s_[y - gutter : y + h + gutter, x - gutter : x + w + gutter]
+        rank[around] = np.pad(rank[y : y + h, x : x + w], gutter, mode="edge")
+        grown[around] = index
+    count = len(rects)
+    return Ranks(
+        rank,
+        owner,
+        grown,
+        np.bincount(owner[inside], coverage[inside] / 255, count).astype(np.float64),
+        np.bincount(owner[inside], minlength=count).astype(np.float64),
+    )
+
+
+def _distance(within: npt.NDArray[np.bool_]) -> SingleArray:
+    """(h, w) texels from the nearest texel that is not within; far where all are."""
+    if within.all():
+        return np.full(within.shape, np.inf, np.float32)
+    return distance_transform_edt(within).astype(np.float32)
+
+
+def seen_at(density: float, reach: float) -> FloatArray:
+    """(m,) how much of a billboard's pixels is sampled at each of MIPS, over all directions and
+    distances; they sum to 1.
+
+    All directions are as likely, but what is seen from in front covers more pixels: both together
+    weigh by the cosine. The mip is that of the longer of the footprint's derivatives along the
+    screen's axes, to which the billboard may be tilted in any direction.
+    """
+    cosine = ((np.arange(ANGLES) + 0.5) / ANGLES)[:, None]
+    turn = (np.arange(TURNS) + 0.5) / TURNS * np.pi / 4
+    longer = np.sqrt(1 + (1 / cosine**2 - 1) * np.cos(turn) ** 2)
+    away = np.geomspace(1.0, max(reach, 1.0), DISTANCES if reach > 1 else 1)
+    mip = np.log2(np.maximum(density * away[:, None, None] * longer, 1e-9))
+    place = np.clip(mip / (MIPS[1] - MIPS[0]), 0, len(MIPS) - 1)
+    lower = np.minimum(place.astype(int), len(MIPS) - 2)
+    weight = np.broadcast_to(cosine, place.shape)
+    share = np.bincount(lower.ravel(), (weight * (lower + 1 - place)).ravel(), len(MIPS))
+    share += np.bincount(lower.ravel() + 1, (weight * (place - lower)).ravel(), len(MIPS))
+    return np.asarray(share / share.sum())
+
+
+def thresholds(ranks: Ranks, target: FloatArray, seen: FloatArray) -> FloatArray:
+    """(p,) the rank from which on as many texels pass as `target`, (p,), says, as nearly as can be.
+
+    seen: (m,) shares of MIPS.
+    """
+    count = len(target)
+    low = float(ranks.rank.min(initial=0.0))
+    bins = int(np.ceil(float(ranks.rank.max(initial=0.0)) - low)) + 2
+    found = np.zeros((count, bins))
+    for owner, rank, share in sampled(ranks, seen):
+        place = owner * bins + (rank - low + 0.5).astype(np.int64)
+        found += share * np.bincount(place, minlength=count * bins).reshape(count, bins)
+    total = np.maximum(found.sum(axis=1, keepdims=True), np.finfo(float).tiny)
+    passing = np.cumsum(found[:, ::-1], axis=1)[:, ::-1] / total * ranks.area[:, None]
+    best = np.abs(passing - target[:, None]).argmin(axis=1)
+    return np.asarray(best + low - 0.5)
+
+
+def sampled(ranks: Ranks, seen: FloatArray) -> Iterator[tuple[IntArray, SingleArray, float]]:
+    """What a client samples of the pictures: their owners, the ranks, and the share of those."""
+    height, width = ranks.rank.shape
+    per_texel = np.sqrt(SAMPLES / max(height * width * np.count_nonzero(seen > 1e-3), 1))
+    n = int(np.clip(per_texel, 1, MOST_SAMPLES))
+    # in the middle of texels nothing is interpolated: one sample stands between middle and corner
+    shift = 0.25 if n == 1 else 0.0
+    y, x = ((np.arange(size * n) + 0.5) / n + shift for size in (height, width))
+    owner = np.repeat(np.repeat(ranks.owner, n, axis=0), n, axis=1)
+    inside = owner >= 0
+    owner = owner[inside]
+    levels = [ranks.rank]
+    for _ in range(int(MIPS[-1]) + 1):
+        levels.append(halved(levels[-1]))
+    images: dict[int, SingleArray] = {}
+
+    def image(level: int) -> SingleArray:
+        if level not in images:
+            scale = 2.0**level
+            images[level] = interpolated(levels[level], y / scale, x / scale)[inside]
+        return images[level]
+
+    for mip, share in zip(MIPS, seen, strict=True):
+        if share > 1e-3:
+            lower, part = int(mip), np.float32(mip % 1)
+            rank = image(lower)
+            yield owner, (rank + part * (image(lower + 1) - rank) if part else rank), share
+
+
+def halved(values: SingleArray) -> SingleArray:
+    """The next mip, (h, w) to ((h + 1) // 2, (w + 1) // 2): means of four, edges repeated."""
+    padded = np.pad(values, [(0, n % 2) for n in values.shape], mode="edge")
+    rows = padded[::2] + padded[1::2]
+    return np.asarray((rows[:, ::2] + rows[:, 1::2]) * np.float32(0.25))
+
+
+def interpolated(values: SingleArray, y: FloatArray, x: FloatArray) -> SingleArray:
+    """(len(y), len(x)) bilinear: texels' middles lie at halves, edges are repeated."""
+    for axis, at in ((0, y), (1, x)):
+        last = values.shape[axis] - 1
+        place = np.clip(at - 0.5, 0, last)
+        first = place.astype(np.int64)
+        part = np.expand_dims((place - first).astype(np.float32), 1 - axis)
+        low = values.take(first, axis=axis)
+        values = low + part * (values.take(np.minimum(first + 1, last), axis=axis) - low)
+    return values
+
+
+def mapped(alpha: ByteArray, ranks: Ranks, threshold: FloatArray) -> ByteArray:
+    """Alpha linear in rank, PASS at the threshold, as steep as 0 to 255 allow in each picture."""
+    count = len(threshold)
+    inside = ranks.owner >= 0
+    owner, rank = ranks.owner[inside], ranks.rank[inside]
+    low, high = np.full(count, np.inf), np.full(count, -np.inf)
+    np.minimum.at(low, owner, rank)
+    np.maximum.at(high, owner, rank)
+    span = np.maximum(threshold - low, high - threshold)
+    plain = (ranks.covered > 0) & (ranks.covered < ranks.area)
+    slope = np.where(plain, PASS / np.maximum(span, 0.5), 0.0)
+    grown = ranks.grown
+    value = PASS + slope[grown] * (ranks.rank - threshold[grown])
+    result = np.clip(np.round(value), 0, 255).astype(np.uint8)
+    keep = (grown < 0) | ~plain[grown]
+    return np.where(keep, alpha, result)
