@@ -56,8 +56,8 @@ class Lump:
     wrong: float
 
 
-def lumps(surface: Surface) -> tuple[Lump, ...]:
-    """The surface with fewer and fewer triangles."""
+def lumps(surface: Surface) -> tuple[float, tuple[Lump, ...]]:
+    """What the surface covers in the mean over all views, and it with fewer and fewer triangles."""
     found: list[Lump] = []
     positions, faces = surface.positions, surface.faces
     if len(faces) > BULK:
@@ -71,7 +71,7 @@ def lumps(surface: Surface) -> tuple[Lump, ...]:
         if len(triangles) and (not found or len(triangles) < len(found[-1].faces)):
             found.append(_lump(surface, left, triangles, shadows, truth))
         target = min(target, float(len(triangles))) / RATIO
-    return tuple(found)
+    return float(truth.sum() * shadows.cell), tuple(found)
 
 
 def collapsed(positions: FloatArray, faces: Ints, target: int) -> tuple[FloatArray, Ints]:

@@ -11,7 +11,7 @@ from vegtool.arrays import FloatArray
 
 DIRECTIONS = 8
 """Of a half sphere; an outline is the same from behind."""
-CELLS = 160
+CELLS = 128
 """Of a grid along the longest extent."""
 ROOM = 1.2
 """Of the extent, that a grid shows: what is drawn in place of a surface may reach farther."""

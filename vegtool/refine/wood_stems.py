@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from vegtool.arrays import FloatArray, IntArray, unit
 from vegtool.branches.axes import axes_of
@@ -23,7 +24,7 @@ from vegtool.plant import Plant
 from vegtool.refine.wood_color import face_colors
 from vegtool.refine.wood_lines import Ints, Lines, lines_of, uneven
 from vegtool.refine.wood_lumps import Lump, Surface, lumps
-from vegtool.refine.wood_shadow import Shadows
+from vegtool.refine.wood_seen import seen_through
 
 LEAST_RATIO, MOST_RATIO = 0.1, 10.0
 """Of a stretch's surface to that of a round taper between its rings."""
@@ -31,6 +32,9 @@ ROUGH = 0.05
 """Of the radius: parts of the wood that are rougher are no stems,"""
 MATTERS = 0.02
 """if they are so much of all wood's surface at least."""
+FLAT = 0.6
+"""Length of the sum of a stem's area vectors over the sum of their lengths: of a tube next to
+nothing, of a sheet nearly one, of half a tube 0.64."""
 FACES_PER_PART = 6
 """The least of a tube. Where parts have fewer on average, faces were parted from each other."""
 
@@ -42,7 +46,8 @@ class Spans:
 
     a, b: (s,) first and last node. middle: (s,) the node at which it is halved, -1 where none lies
     between. parent: (s,) what it is half of, -1 for a whole stem. deviation: (s,) how far surface
-    between lies from a straight taper at most, in units of the stems.
+    between lies from a straight taper at most, in units of the stems. rounds: where among the spans
+    halves begin, halves of halves, and so on, and their end.
     """
 
     a: Ints
@@ -50,6 +55,7 @@ class Spans:
     middle: Ints
     parent: Ints
     deviation: FloatArray
+    rounds: tuple[int, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,37 +71,50 @@ class Solid:
 class Stems:
     """The wood of a plant as stems, t of them, with n nodes, one stem's after the other's.
 
-    Lengths are in units of `radius` metres about `center`, (3,) metres. node: (n, 3). girth: (n,)
-    perimeter. area: (n,) surface between the node before and this one, 0 at a stem's first. color:
-    (n, 3) linear, times that surface. swing: (n, 3, 3) the same times where on the stem it is, as
-    unit vectors from its axis, the last index: the first harmonic of the colour around it. stem: (n,). first, last: (t,) nodes. host: (t,) the stem it
-    grows from, -1 for none. host_node, host_part: (t,) where: at that node of the host, or before
-    it by (1 - part) of the way from the node before. spans: where the stems bend.
+    Lengths are in units of `radius` metres about `center`, (3,) metres.
+
+    node: (n, 3). girth: (n,) perimeter. stem: (n,). first, last: (t,) nodes. Between the node
+    before and this one, 0 at a stem's first:
+    area: (n,) the surface, both sides of what is flat and seen from both. seen: (n,) as much of it
+    as is not hidden. color: (n, 3) linear, times the surface. swing: (n, 3, 3) that times the side
+    of the stem that it is on, unit vectors from the axis, the last index.
+
+    host: (t,) the stem it grows from, -1 for none. host_node, host_part: (t,) where: at that part
+    of the way to that node from the node before. rough: (t,) how far the wood lies from any taper,
+    in the mean. facing: (t, 3) unit normal of what is flat, else 0. solids: what is not round.
     """
 
     center: FloatArray
     radius: float
     node: FloatArray
     girth: FloatArray
-    area: FloatArray
-    color: FloatArray
-    swing: FloatArray
     stem: Ints
     first: Ints
     last: Ints
+    area: FloatArray
+    seen: FloatArray
+    color: FloatArray
+    swing: FloatArray
     host: Ints
     host_node: Ints
     host_part: FloatArray
     rough: FloatArray
+    facing: FloatArray
     spans: Spans
     solids: tuple[Solid, ...]
 
     def __len__(self) -> int:
         return len(self.first)
 
+    @property
+    def flat(self) -> npt.NDArray[np.bool_]:
+        """(t,)"""
+        return np.asarray(self.facing.any(axis=1))
+
 
 def stems_of(plant: Plant, faces: IntArray) -> Stems | None:
     """The stems of some faces of a plant, (k,) indices; None where they have no area."""
+    others = np.setdiff1d(np.arange(len(plant.faces), dtype=np.int32), faces)
     faces = faces[plant.face_areas[faces] > 0]
     if not len(faces):
         return None
@@ -106,30 +125,44 @@ def stems_of(plant: Plant, faces: IntArray) -> Stems | None:
     rings = skeleton(parts)
     tubes = cut_tubes(rings)
     lines = lines_of(parts, rings, tubes)
-    corners, area = parts.positions[parts.faces], plant.face_areas[faces] / radius**2
-    color = face_colors(plant, faces)
+    rough, tube_part = uneven(parts, rings, tubes), rings.part[tubes.start]
+    corners, color = parts.positions[parts.faces], face_colors(plant, faces)
 
-    rough = uneven(parts, rings, tubes)
-    tube_part = rings.part[tubes.start]
+    area = plant.face_areas[faces] / radius**2
+    solids, of_solid = [], np.zeros(parts.count, dtype=bool)
     surface = Surface(parts.positions, parts.faces, color, lines.node)
-    solid = []
     for part in rough_parts(lines, area, rough, tube_part):
-        stems, own = np.flatnonzero(tube_part == part), parts.face_part == part
-        found = lumps(surface.of(own))
+        own = parts.face_part == part
+        covered, found = lumps(surface.of(own))
         if found:
-            shadows = Shadows.around(corners[own])
-            covered = float(shadows.of(corners[own]).sum() * shadows.cell)
             area = np.where(own, area * 4 * covered / area[own].sum(), area)
-            solid.append(Solid(stems, found))
-    host, host_node, host_part = hosts(lines, join_tubes(rings, tubes, axes_of(rings, tubes)))
-    first, last = lines.ends()
-    surface_of = np.bincount(lines.owner, area, len(lines.node))
+            solids.append(Solid(np.flatnonzero(tube_part == part), found))
+            of_solid[part] = True
+    line = lines.line[lines.owner]
+    two_sided = np.array([m.double_sided for m in plant.materials])[plant.face_material[faces]]
+    facing = facing_of(line, plant.face_area_vectors[faces] / radius**2, len(rough))
+    facing[of_solid[tube_part]] = 0.0
+    area = np.where(facing.any(axis=1)[line] & two_sided, 2 * area, area)
+
+    surfaces = np.bincount(lines.owner, area, len(lines.node))
     light, swing = colors(lines, corners.mean(axis=1), color * area[:, None])
-    girth = true_girth(lines, surface_of)
+    girth = true_girth(lines, surfaces)
+    seen = surfaces * seen_through(plant, others, lines.node * radius + center)
+    first, last = lines.ends()
     return Stems(
-        center, radius, lines.node, girth, surface_of, light, swing, lines.line, first, last,
-        host, host_node, host_part, rough, halved(lines.node, girth, first, last), tuple(solid),
+        center, radius, lines.node, girth, lines.line, first, last,
+        surfaces, seen, light, swing,
+        *hosts(lines, join_tubes(rings, tubes, axes_of(rings, tubes))),
+        rough, facing, halved(lines.node, girth, first, last), tuple(solids),
     )  # fmt: skip
+
+
+def facing_of(line: Ints, vector: FloatArray, count: int) -> FloatArray:
+    """(t, 3) mean normals of lines whose faces, with area vectors (f, 3), nearly all face one way;
+    0 of others."""
+    total = np.stack([np.bincount(line, v, count) for v in vector.T], axis=1)
+    whole = np.bincount(line, np.linalg.norm(vector, axis=1), count)
+    return unit(np.where((np.linalg.norm(total, axis=1) > FLAT * whole)[:, None], total, 0.0))
 
 
 def parts_of(plant: Plant, faces: IntArray, center: FloatArray, radius: float) -> Parts:
@@ -205,19 +238,19 @@ def hosts(lines: Lines, host: Ints) -> tuple[Ints, Ints, FloatArray]:
 def halved(node: FloatArray, girth: FloatArray, first: Ints, last: Ints) -> Spans:
     """The spans of stems between their first and last nodes."""
     a, b, parent = first, last, np.full(len(first), -1)
-    found = []
-    count = 0
+    found, rounds = [], [0]
     while len(a):
         middle, deviation = farthest_between(node, girth, a, b)
         found.append((a, b, middle, parent, deviation))
         here = np.flatnonzero(middle >= 0)
-        parent = np.repeat(here + count, 2)
-        count += len(a)
+        parent = np.repeat(here + rounds[-1], 2)
+        rounds.append(rounds[-1] + len(a))
         a, b = (
             np.stack([a[here], middle[here]], axis=1).ravel(),
             np.stack([middle[here], b[here]], axis=1).ravel(),
         )
-    return Spans(*(np.concatenate(column) for column in zip(*found, strict=True)))
+    columns = (np.concatenate(column) for column in zip(*found, strict=True))
+    return Spans(*columns, rounds=tuple(rounds[1:]))
 
 
 def farthest_between(

@@ -1,0 +1,68 @@
+"""How much of the wood is seen from outside, through the leaves.
+
+What stands before a point is taken as spread evenly over a cell of a grid across the view: leaves
+of area a before a cell of area c let exp(-a / c) through (Monsi and Saeki, 1953; a counts as seen
+from there, without what is cut out of it).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vegtool.arrays import FloatArray, IntArray
+from vegtool.plant import Plant
+from vegtool.refine.wood_color import WITHIN
+
+DIRECTIONS = 12
+CELLS = 24
+"""Across the plant."""
+
+
+def seen_through(plant: Plant, others: IntArray, points: FloatArray) -> FloatArray:
+    """(n,) 0 to 1: how much is seen of points (n, 3), metres, behind the faces `others`, (k,), in
+    the mean over directions from all around."""
+    if not len(others):
+        return np.ones(len(points))
+    center, radius = plant.center, plant.radius
+    covering = plant.face_area_vectors[others] * opacity(plant, others)[:, None] / radius**2
+    leaves = (plant.face_centroids[others] - center) / radius
+    local = (points - center) / radius
+    nth = np.arange(DIRECTIONS)
+    height = 1 - (2 * nth + 1) / DIRECTIONS
+    turn = np.pi * nth * (3 - 5**0.5)
+    across = np.sqrt(1 - height * height)
+    views = np.stack([across * np.cos(turn), height, across * np.sin(turn)], axis=1)
+    seen = np.zeros(len(points))
+    for view in views:
+        right = np.cross([0.0, 1.0, 0.0], view)
+        right /= np.linalg.norm(right)
+        frame = np.stack([right, np.cross(view, right)], axis=1)
+        both = np.concatenate([leaves, local])
+        cell = np.clip(((both @ frame + 1) / 2 * CELLS).astype(np.int64), 0, CELLS - 1)
+        key = cell[:, 0] * CELLS + cell[:, 1]
+        order = np.lexsort((-(both @ view), key))
+        area = np.append(np.abs(covering @ view), np.zeros(len(points)))[order]
+        total = np.cumsum(area)
+        start = np.searchsorted(key[order], key[order])
+        before = np.empty(len(both))
+        before[order] = total - total[start] + area[start]
+        seen += np.exp(-before[len(leaves) :] / (2 / CELLS) ** 2)
+    return seen / DIRECTIONS
+
+
+def opacity(plant: Plant, faces: IntArray) -> FloatArray:
+    """(k,) how much of each face its texture's alpha leaves."""
+    result = np.ones(len(faces))
+    material = plant.face_material[faces]
+    for number in np.unique(material):
+        surface = plant.materials[number]
+        if surface.alpha_mode != "mask" or surface.color_texture is None:
+            continue
+        own = np.flatnonzero(material == number)
+        alpha = surface.color_texture.pixels[..., 3]
+        uv = np.einsum("pc,fci->fpi", WITHIN, plant.uvs[plant.faces[faces[own]]])
+        height, width = alpha.shape
+        x, y = np.moveaxis((uv - np.floor(uv)) * [width, height], 2, 0).astype(np.int64)
+        shown = alpha[np.minimum(y, height - 1), np.minimum(x, width - 1)] / 255
+        result[own] = (shown * surface.base_color[3] >= surface.alpha_cutoff).mean(axis=1)
+    return result
