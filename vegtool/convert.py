@@ -27,17 +27,19 @@ from vegtool.timing import timed
 if TYPE_CHECKING:
     from vegtool.baking.bake import PlantBuffers
 
-LEVEL_RATIO = 3
-"""Each level has about a third of the billboards of the one before."""
+LEVEL_RATIO = 2
+"""Each level has half the billboards of the one before, for half its size on the screen."""
 
 NEAR_PIXELS = (200.0, 512)
 """Size of a plant on the screen (pixels, its longest side) that so many billboards are made for."""
+NEAR_GROWTH = 3
+"""So many times the billboards are for twice the size, where nothing else is said."""
 
 NEAR_LIMITS = (8.0, 1024.0)
 """Pixels. Below, even one billboard's picture has too few texels to be one; above, a plant is as
 large as the screen."""
 
-MOST_OF_PREVIOUS = 0.5
+MOST_OF_PREVIOUS = 0.75
 """A level has at most this share of the triangles of the one before it, or it is left out."""
 
 MAKING = 0.4
@@ -68,9 +70,23 @@ class ConvertOptions:
     )
     levels: int = option(
         4,
-        "Billboard levels to make, each of a third of the planes; those of no use are left out.",
+        "Billboard levels to make, each of half the planes; those of no use are left out.",
         least=1,
         most=12,
+    )
+    pixels: float | None = option(
+        None,
+        "Size on the screen that the first level is made for, in pixels of the plant's longest "
+        f"side, and each level for half of it [by --billboards: {NEAR_PIXELS[0]:g} for "
+        f"{NEAR_PIXELS[1]}].",
+        least=8.0,
+        most=4096.0,
+    )
+    refine: str = option(
+        "full",
+        "full: planes by image error, wood as a small mesh, coverage and colour as measured; "
+        "none: the paper's billboards.",
+        choices=("full", "none"),
     )
     orientation_weight: float = option(
         ClusterOptions().orientation_weight,
@@ -120,7 +136,10 @@ def convert(
     CapabilityError where nothing can draw.
     """
     from vegtool.baking.bake import PlantBuffers
-    from vegtool.measure.chain import with_distances
+    from vegtool.measure.chain import views_of, with_distances
+    from vegtool.measure.distances import rounded_up
+    from vegtool.measure.scores import TruthsAt
+    from vegtool.refine.level import refined_level, source_of
 
     options, measure = options or ConvertOptions(), measure or MeasureOptions()
     check_limits(options)
@@ -129,24 +148,38 @@ def convert(
     levels = [Level("mesh", mesh=plant, geometric_error_m=(0.0, 0.0))]
     counts = billboard_counts(plant, options)
     with PlantBuffers(plant) as buffers:
+        truth_at = TruthsAt(plant, views_of(measure), options.display, buffers)
+        source = source_of(buffers, truth_at) if options.refine == "full" else None
         for index, count in enumerate(counts):
 
             def report(stage: str, fraction: float, index: int = index) -> None:
                 done = making * (index + fraction) / len(counts)
                 progress(f"LOD{index + 1}: {stage}", done)
 
-            near = distance_of(plant, options.display, near_pixels(count))
-            level = billboard_level(buffers, options, count, near, report)
+            size = (options.pixels or near_pixels(counts[0])) / LEVEL_RATIO**index
+            near = rounded_up(distance_of(plant, options.display, max(size, NEAR_LIMITS[0])))
+            if source is None:
+                level = billboard_level(buffers, options, count, near, report)
+            else:
+                level = refined_level(
+                    source,
+                    TRIANGLES_PER_BILLBOARD * count,
+                    near,
+                    options.max_texture,
+                    options.seed,
+                    report,
+                )
             saves = level.triangles <= MOST_OF_PREVIOUS * levels[-1].triangles
             if saves or (index == len(counts) - 1 and len(levels) == 1):
                 levels.append(level)
-    kept, notes = with_distances(
-        plant,
-        levels[1:],
-        measure,
-        options.display,
-        lambda stage, fraction: progress(stage, making + (1 - making) * fraction),
-    )
+        kept, notes = with_distances(
+            plant,
+            levels[1:],
+            measure,
+            options.display,
+            lambda stage, fraction: progress(stage, making + (1 - making) * fraction),
+            truth_at,
+        )
     progress("levels", 1.0)
     told = {**asdict(options), **asdict(measure)}
     return LodChain(plant.name, (levels[0], *kept), options.display, options.seed, told, notes)
@@ -197,7 +230,7 @@ def billboard_level(
 
 
 def billboard_counts(plant: Plant, options: ConvertOptions) -> list[int]:
-    """Planes per level, finest first: a third each time, never more than the plant can use."""
+    """Planes per level, finest first: half each time, never more than the plant can use."""
     most = int(MOST_OF_PREVIOUS * len(plant.faces) / TRIANGLES_PER_BILLBOARD)
     first = min(options.billboards, max(1, most))
     return [max(1, round(first / LEVEL_RATIO**i)) for i in range(options.levels)]
@@ -206,8 +239,8 @@ def billboard_counts(plant: Plant, options: ConvertOptions) -> list[int]:
 def near_pixels(count: int) -> float:
     """Size on the screen (pixels, the plant's longest side) that `count` billboards are made for.
 
-    A third of the billboards are for half the size; an atlas is made for it.
+    A third of the billboards would be for half the size; an atlas is made for it.
     """
     pixels, billboards = NEAR_PIXELS
-    size = float(pixels * (count / billboards) ** (log(2) / log(LEVEL_RATIO)))
+    size = float(pixels * (count / billboards) ** (log(2) / log(NEAR_GROWTH)))
     return min(max(size, NEAR_LIMITS[0]), NEAR_LIMITS[1])

@@ -20,7 +20,7 @@ from vegtool.measure.bounds import distance_for_pixels
 from vegtool.measure.distances import LeftOut, limits, rounded_up, switch_distances
 from vegtool.measure.options import MeasureOptions
 from vegtool.measure.pictures import client_plant
-from vegtool.measure.scores import LADDER, Scores, outside, scores, truths
+from vegtool.measure.scores import LADDER, Scores, TruthsAt, outside, scores
 from vegtool.measure.views import CLOSEST, View, views
 from vegtool.plant import Plant
 from vegtool.progress import Progress, silent
@@ -42,11 +42,13 @@ def with_distances(
     options: MeasureOptions,
     display: Display,
     progress: Progress = silent,
+    truth_at: TruthsAt | None = None,
 ) -> tuple[tuple[Level, ...], tuple[str, ...]]:
     """The levels that may be used somewhere, with `near_distance_m` and `measured`; and a sentence
     on each that was left out.
 
-    levels: coarser and coarser, without the original. Raises QualityError where none keeps to
+    levels: coarser and coarser, without the original. truth_at: the plant's truths from
+    `views_of(options)`, where some are drawn already. Raises QualityError where none keeps to
     `max_error` at any size, UsageError where no size is seen from outside the plant.
     """
     if options.max_pixels is not None:
@@ -60,7 +62,13 @@ def with_distances(
         return _unmeasured(plant, levels, least_m)
     least_m = [max(pair) for pair in zip(least_m, _by_texels(levels, display), strict=True)]
     with ExitStack() as stack:
-        return _by_error(_Measuring(stack, plant, levels, options, display), least_m, progress)
+        bench = _Measuring(stack, plant, levels, options, display, truth_at)
+        return _by_error(bench, least_m, progress)
+
+
+def views_of(options: MeasureOptions) -> tuple[View, ...]:
+    """The views that distances are chosen by."""
+    return views(options.views, FULL_VIEWS if options.measure == "full" else QUICK_VIEWS)
 
 
 def misses(levels: Sequence[Level], options: MeasureOptions) -> list[str]:
@@ -97,11 +105,14 @@ class _Measuring:
         levels: Sequence[Level],
         options: MeasureOptions,
         display: Display,
+        truth_at: TruthsAt | None,
     ) -> None:
         self.plant, self.levels, self.options, self.display = plant, levels, options, display
-        self.views = views(options.views, FULL_VIEWS if options.measure == "full" else QUICK_VIEWS)
         meshes = [plant, *(client_plant(level) for level in levels)]
-        self._sharp = stack.enter_context(PlantBuffers(plant))
+        if truth_at is None:
+            sharp = stack.enter_context(PlantBuffers(plant))
+            truth_at = TruthsAt(plant, views_of(options), display, sharp)
+        self._truth_at = truth_at
         self._drawn = [stack.enter_context(PlantBuffers(mesh, mipmaps=True)) for mesh in meshes]
         self._known: dict[tuple[float, int], Scores] = {}
 
@@ -127,7 +138,7 @@ class _Measuring:
     def scores(self, distance_m: float, which: Sequence[int]) -> list[Scores]:
         """Of some of what is measured, at one distance."""
         new = [index for index in which if (distance_m, index) not in self._known]
-        found = self._measure(self.views, distance_m, new) if new else []
+        found = self._measure(self._truth_at, distance_m, new) if new else []
         self._known.update({(distance_m, i): s for i, s in zip(new, found, strict=True)})
         return [self._known[distance_m, index] for index in which]
 
@@ -153,15 +164,13 @@ class _Measuring:
         held_out = None
         if self.options.max_error is not None:
             others = views(self.options.views, HELD_OUT_VIEWS, HELD_OUT_PHASE)
-            held_out = self._measure(others, distance_m, (1 + level,))[0].spread("flip", 0)
-        pixels = self.pixels(distance_m)
-        return Measured(pixels, self.options.views, len(self.views), found, live, held_out)
+            other_truths = self._truth_at.from_views(others)
+            held_out = self._measure(other_truths, distance_m, (1 + level,))[0].spread("flip", 0)
+        pixels, count = self.pixels(distance_m), len(self._truth_at.views)
+        return Measured(pixels, self.options.views, count, found, live, held_out)
 
-    def _measure(
-        self, shown: Sequence[View], distance_m: float, which: Sequence[int]
-    ) -> list[Scores]:
-        pixels = [self.pixels(distance_m)]
-        truth = truths(self.plant, shown, pixels, self.display, buffers=self._sharp)
+    def _measure(self, truth_at: TruthsAt, distance_m: float, which: Sequence[int]) -> list[Scores]:
+        truth = truth_at(distance_m)
         return [scores(truth, self._drawn[index]) for index in which]
 
 

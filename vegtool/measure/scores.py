@@ -124,6 +124,33 @@ def outside(
     return sizes[seen], distances[seen]
 
 
+class TruthsAt:
+    """What a plant looks like from the same views at any distance, each drawn once.
+
+    plant, views, display: as of `truths`. buffers: the plant's, without mipmaps.
+    """
+
+    def __init__(
+        self, plant: Plant, views: Sequence[View], display: Display, buffers: PlantBuffers
+    ) -> None:
+        self.plant, self.views, self.display = plant, tuple(views), display
+        self._buffers = buffers
+        self._known: dict[float, Truths] = {}
+
+    def __call__(self, distance_m: float, progress: Progress = silent) -> Truths:
+        """From that many metres away."""
+        if distance_m not in self._known:
+            size = self.plant.extent * self.display.pixels_per_metre(distance_m)
+            self._known[distance_m] = truths(
+                self.plant, self.views, [size], self.display, progress, self._buffers
+            )
+        return self._known[distance_m]
+
+    def from_views(self, views: Sequence[View]) -> TruthsAt:
+        """The same plant from other views."""
+        return TruthsAt(self.plant, views, self.display, self._buffers)
+
+
 def scores(
     truths: Truths,
     level: Level | PlantBuffers | Callable[[View], Level],
