@@ -38,11 +38,11 @@ SECTIONS = (
     Section(7, 7, (0.005, 0.005)),
 )
 """Outlines alone would make 0.42, 0.04, 0.04, 0.013 and 0.007 of it; these, which count what is lit
-wrongly too, gave the least FLIP of the wood of four plants. Odd numbers of sides, for then a regular
-prism is nearly as wide from everywhere."""
+wrongly too, gave the least FLIP of the wood of four plants. Odd numbers of sides, for then a prism
+is nearly as wide from everywhere."""
 BENT = 0.4
-"""Share of what a straight taper covers that is wrong, over its greatest deviation in diameters (in
-pixels, where it is thinner): a picture shows a part of the mean. From the same pictures as above."""
+"""Share of what a straight taper covers that is wrong, over its greatest deviation in diameters, or
+in pixels where it is thinner: a picture shows a part of the mean. From the same pictures."""
 DISPLACED = 2.0
 """The most of it: all is missing in its place, and as much is too much elsewhere."""
 TIP = 0.5
@@ -75,8 +75,9 @@ class Screen:
     """The stems in pixels, of which one is `pixel` long in their units.
 
     covered: (t,) by each stem, in the mean over all views. counts: (t,) share of it that is seen.
-    thick: (t,) mean diameter. rough: (t,) pixels wrong of any taper. pointed: (t,). bent: (s,) how many of a span's pixels are wrong where
-    it is straight. worth: (s,) the price of a segment up to which it is halved.
+    thick: (t,) mean diameter. rough: (t,) pixels that are wrong in any taper. pointed: (t,) ends
+    in a point. bent: (s,) how many of a span's pixels are wrong where it is straight. worth: (s,)
+    the price of a segment up to which it is halved.
     """
 
     stems: Stems
@@ -205,7 +206,7 @@ class Screen:
 
     @cached_property
     def _side_by_side(self) -> Ints:
-        """(t,) the stems along a curve that passes neighbours one after the other (Morton, 1966)."""
+        """(t,) the stems along a curve that passes neighbours one by one (Morton, 1966)."""
         middle = (self.stems.node[self.stems.first] + self.stems.node[self.stems.last]) / 2
         cell = np.clip((middle + 1) * 512, 0, 1023).astype(np.int64)
         key = np.zeros(len(cell), dtype=np.int64)

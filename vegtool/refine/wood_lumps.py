@@ -18,7 +18,7 @@ from vegtool.refine.wood_shadow import Shadows
 
 LEAST = 12
 """Triangles: with fewer, nothing is left of a shape."""
-RATIO = 1.5
+RATIO = 1.3
 """From one number of triangles to the next."""
 MOST = 1_000
 """Triangles: with more there is no need to reduce."""

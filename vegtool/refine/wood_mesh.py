@@ -49,14 +49,15 @@ class Tapers:
 
 def mesh_of(stems: Stems, choice: Choice) -> Mesh:
     """All that is drawn."""
-    tapers = straightened(stems, choice)
     meshes = [
         Mesh(lump.positions, lump.normals, lump.colors, lump.faces) for _, lump in choice.lumps
     ]
-    for index, section in enumerate(SECTIONS):
-        rows = np.flatnonzero((choice.section == index)[tapers.stem])
-        if len(rows):
-            meshes.append(swept(tapers.of(rows), section))
+    if (choice.wider > 0).any():
+        tapers = straightened(stems, choice)
+        for index, section in enumerate(SECTIONS):
+            rows = np.flatnonzero((choice.section == index)[tapers.stem])
+            if len(rows):
+                meshes.append(swept(tapers.of(rows), section))
     before = np.cumsum([0, *(len(mesh.positions) for mesh in meshes[:-1])])
     return Mesh(
         np.concatenate([mesh.positions for mesh in meshes]),
@@ -93,7 +94,7 @@ def straightened(stems: Stems, choice: Choice) -> Tapers:
         taper = (girth[1:] + girth[:-1]) / 2 * length
         made = np.append(0.0, taper) + np.append(taper, 0.0)
         girth = girth * np.divide(surface, made, out=np.ones_like(girth), where=made > 0)
-    made = np.bincount(stem[1:], (girth[1:] + girth[:-1]) / 2 * length, len(stems))
+    made = np.bincount(stem[1:], (girth[1:] + girth[:-1]) / 2 * length, len(stems)).astype(float)
     whole = np.bincount(stem, surface, len(stems)) / 2
     scale = np.divide(whole, made, out=np.ones_like(made), where=made > 0) * choice.wider
     return Tapers(at, girth * scale[stem], color, stem, stems.facing[stem])

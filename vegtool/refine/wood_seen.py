@@ -18,11 +18,11 @@ CELLS = 24
 """Across the plant."""
 
 
-def seen_through(plant: Plant, others: IntArray, points: FloatArray) -> FloatArray:
-    """(n,) 0 to 1: how much is seen of points (n, 3), metres, behind the faces `others`, (k,), in
-    the mean over directions from all around."""
+def seen_through(plant: Plant, others: IntArray, points: FloatArray) -> tuple[FloatArray, float]:
+    """(n,) 0 to 1, how much is seen of points (n, 3), metres, behind the faces `others`, (k,); and
+    the square metres that these cover. Both in the mean over directions from all around."""
     if not len(others):
-        return np.ones(len(points))
+        return np.ones(len(points)), 0.0
     center, radius = plant.center, plant.radius
     covering = plant.face_area_vectors[others] * opacity(plant, others)[:, None] / radius**2
     leaves = (plant.face_centroids[others] - center) / radius
@@ -32,7 +32,7 @@ def seen_through(plant: Plant, others: IntArray, points: FloatArray) -> FloatArr
     turn = np.pi * nth * (3 - 5**0.5)
     across = np.sqrt(1 - height * height)
     views = np.stack([across * np.cos(turn), height, across * np.sin(turn)], axis=1)
-    seen = np.zeros(len(points))
+    seen, covered, size = np.zeros(len(points)), 0.0, (2 / CELLS) ** 2
     for view in views:
         right = np.cross([0.0, 1.0, 0.0], view)
         right /= np.linalg.norm(right)
@@ -46,8 +46,9 @@ def seen_through(plant: Plant, others: IntArray, points: FloatArray) -> FloatArr
         start = np.searchsorted(key[order], key[order])
         before = np.empty(len(both))
         before[order] = total - total[start] + area[start]
-        seen += np.exp(-before[len(leaves) :] / (2 / CELLS) ** 2)
-    return seen / DIRECTIONS
+        seen += np.exp(-before[len(leaves) :] / size)
+        covered += size * float((1 - np.exp(-np.bincount(key[order], area) / size)).sum())
+    return seen / DIRECTIONS, covered / DIRECTIONS * radius**2
 
 
 def opacity(plant: Plant, faces: IntArray) -> FloatArray:

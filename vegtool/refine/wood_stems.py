@@ -82,6 +82,7 @@ class Stems:
     host: (t,) the stem it grows from, -1 for none. host_node, host_part: (t,) where: at that part
     of the way to that node from the node before. rough: (t,) how far the wood lies from any taper,
     in the mean. facing: (t, 3) unit normal of what is flat, else 0. solids: what is not round.
+    covered: what the whole plant covers, in the mean over all views.
     """
 
     center: FloatArray
@@ -102,6 +103,7 @@ class Stems:
     facing: FloatArray
     spans: Spans
     solids: tuple[Solid, ...]
+    covered: float
 
     def __len__(self) -> int:
         return len(self.first)
@@ -125,36 +127,50 @@ def stems_of(plant: Plant, faces: IntArray) -> Stems | None:
     rings = skeleton(parts)
     tubes = cut_tubes(rings)
     lines = lines_of(parts, rings, tubes)
-    rough, tube_part = uneven(parts, rings, tubes), rings.part[tubes.start]
     corners, color = parts.positions[parts.faces], face_colors(plant, faces)
+    area, vector = plant.face_areas[faces] / radius**2, plant.face_area_vectors[faces] / radius**2
+    rough, line = uneven(parts, rings, tubes), lines.line[lines.owner]
 
-    area = plant.face_areas[faces] / radius**2
-    solids, of_solid = [], np.zeros(parts.count, dtype=bool)
     surface = Surface(parts.positions, parts.faces, color, lines.node)
-    for part in rough_parts(lines, area, rough, tube_part):
-        own = parts.face_part == part
-        covered, found = lumps(surface.of(own))
-        if found:
-            area = np.where(own, area * 4 * covered / area[own].sum(), area)
-            solids.append(Solid(np.flatnonzero(tube_part == part), found))
-            of_solid[part] = True
-    line = lines.line[lines.owner]
+    solids, area = solids_of(surface, lines, parts.face_part, rings.part[tubes.start], area, rough)
+    facing = facing_of(line, vector, len(rough))
+    for solid in solids:
+        facing[solid.stems] = 0.0
     two_sided = np.array([m.double_sided for m in plant.materials])[plant.face_material[faces]]
-    facing = facing_of(line, plant.face_area_vectors[faces] / radius**2, len(rough))
-    facing[of_solid[tube_part]] = 0.0
-    area = np.where(facing.any(axis=1)[line] & two_sided, 2 * area, area)
+    area = np.where(np.asarray(facing.any(axis=1))[line] & two_sided, 2 * area, area)
 
-    surfaces = np.bincount(lines.owner, area, len(lines.node))
+    surfaces = np.bincount(lines.owner, area, len(lines.node)).astype(np.float64)
     light, swing = colors(lines, corners.mean(axis=1), color * area[:, None])
     girth = true_girth(lines, surfaces)
-    seen = surfaces * seen_through(plant, others, lines.node * radius + center)
+    share, covered_m2 = seen_through(plant, others, lines.node * radius + center)
+    covered = covered_m2 / radius**2 + float(share @ surfaces) / 4
     first, last = lines.ends()
     return Stems(
         center, radius, lines.node, girth, lines.line, first, last,
-        surfaces, seen, light, swing,
+        surfaces, share * surfaces, light, swing,
         *hosts(lines, join_tubes(rings, tubes, axes_of(rings, tubes))),
-        rough, facing, halved(lines.node, girth, first, last), tuple(solids),
+        rough, facing, halved(lines.node, girth, first, last), solids, covered,
     )  # fmt: skip
+
+
+def solids_of(
+    surface: Surface,
+    lines: Lines,
+    face_part: Ints,
+    line_part: Ints,
+    area: FloatArray,
+    rough: FloatArray,
+) -> tuple[tuple[Solid, ...], FloatArray]:
+    """What is not round, and areas (f,) of all faces, where its are such that it covers a quarter
+    of them, as what is round does."""
+    solids = []
+    for part in rough_parts(lines, area, rough, line_part):
+        own = face_part == part
+        covered, found = lumps(surface.of(own))
+        if found:
+            area = np.where(own, area * 4 * covered / area[own].sum(), area)
+            solids.append(Solid(np.flatnonzero(line_part == part), found))
+    return tuple(solids), area
 
 
 def facing_of(line: Ints, vector: FloatArray, count: int) -> FloatArray:
@@ -199,7 +215,7 @@ def colors(lines: Lines, middle: FloatArray, color: FloatArray) -> tuple[FloatAr
     axis = unit(node[owner] - node[owner - 1])
     away = middle - node[owner]
     side = unit(away - (away * axis).sum(axis=1)[:, None] * axis)
-    total = np.stack([np.bincount(owner, c, len(node)) for c in color.T], axis=1)
+    total = np.stack([np.bincount(owner, c, len(node)) for c in color.T], axis=1).astype(float)
     swing = [[np.bincount(owner, c * d, len(node)) for d in side.T] for c in color.T]
     return total, np.moveaxis(np.array(swing), 2, 0)
 
@@ -249,8 +265,8 @@ def halved(node: FloatArray, girth: FloatArray, first: Ints, last: Ints) -> Span
             np.stack([a[here], middle[here]], axis=1).ravel(),
             np.stack([middle[here], b[here]], axis=1).ravel(),
         )
-    columns = (np.concatenate(column) for column in zip(*found, strict=True))
-    return Spans(*columns, rounds=tuple(rounds[1:]))
+    a, b, middle, parent, deviation = (np.concatenate(c) for c in zip(*found, strict=True))
+    return Spans(a, b, middle, parent, deviation, tuple(rounds[1:]))
 
 
 def farthest_between(
