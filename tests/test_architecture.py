@@ -28,12 +28,15 @@ MAY_IMPORT: dict[str, set[str]] = {
     "baking": {"gl"},
     "measure": {"gl"},
     "baselines": {"formats", "baking", "gl", "measure"},
-    "convert": {"clustering", "boxes", "baking", "measure"},
+    "refine": {"branches", "clustering", "boxes", "gl", "baking", "measure"},
+    "convert": {"clustering", "boxes", "baking", "measure", "refine"},
     "batch": {"convert", "formats", "measure"},
     "stability": {
         "branches", "clustering", "boxes", "gl", "baking", "measure", "convert", "growth",
     },
-    "report": {"formats", "clustering", "gl", "measure", "baselines", "convert", "console"},
+    "report": {
+        "formats", "clustering", "gl", "measure", "baselines", "refine", "convert", "console",
+    },
     "outcomes": {"batch", "console"},
     "inspect": {"branches", "formats", "console"},
     "doctor": {"measure"},

@@ -103,7 +103,7 @@ def convert_command(
 
         vegtool convert oak.glb -o out/
 
-        vegtool convert models/ -o out/ -j 4 --method kmeans --billboards 256
+        vegtool convert models/ -o out/ -j 4 --billboards 256
     """
     from vegtool.batch import Task, convert_files, find_jobs
     from vegtool.outcomes import as_summary, summary_text

@@ -8,7 +8,7 @@ per pixel at that size. From where it may be used is measured then (measure/chai
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from math import log
 from typing import TYPE_CHECKING, cast, get_args
 
@@ -16,10 +16,11 @@ from vegtool.arrays import IntArray
 from vegtool.baking.options import BakeOptions
 from vegtool.boxes.options import BoxOptions, Shape
 from vegtool.clustering import METHODS, ClusterOptions
+from vegtool.errors import UsageError
 from vegtool.lod import Display, Level, LodChain
 from vegtool.measure.options import MeasureOptions
 from vegtool.measure.views import distance_of
-from vegtool.options import check_limits, option
+from vegtool.options import check_limits, flag_of, option
 from vegtool.plant import Plant
 from vegtool.progress import Progress, silent
 from vegtool.timing import timed
@@ -47,17 +48,25 @@ MAKING = 0.4
 
 MOST_BILLBOARDS = 100_000
 
+PLAIN = ("method", "orientation_weight", "shape")
+"""Options of the plain method alone."""
+
 TRIANGLES_PER_BILLBOARD = 2
 """At least: four where both sides have pictures of their own."""
 
 
 @dataclass(frozen=True)
 class ConvertOptions:
-    """What shapes a chain of levels. The command line makes its flags from these fields."""
+    """What shapes a chain of levels. The command line makes its flags from these fields.
+
+    Raises UsageError for an option of the plain method beside another one.
+    """
 
     method: str = option(
         "branches",
-        "What clusters are like. " + "; ".join(f"{k}: {v}" for k, (_, v) in METHODS.items()) + ".",
+        "What clusters of --refine none are like. "
+        + "; ".join(f"{k}: {v}" for k, (_, v) in METHODS.items())
+        + ".",
         choices=tuple(METHODS),
         short="m",
     )
@@ -90,13 +99,14 @@ class ConvertOptions:
     )
     orientation_weight: float = option(
         ClusterOptions().orientation_weight,
-        "How much clusters follow face orientation, beside position; 0 is the paper's method.",
+        "How much clusters of --refine none follow face orientation, beside position; 0 is the "
+        "paper's method.",
         least=0.0,
         most=100.0,
     )
     shape: str = option(
         BoxOptions().shape,
-        "Billboards per cluster: by the box's form, one, or crossed.",
+        "Billboards per cluster of --refine none: by the box's form, one, or crossed.",
         choices=get_args(Shape),
     )
     max_texture: int = option(
@@ -115,6 +125,11 @@ class ConvertOptions:
         most=32768,
     )
     seed: int = option(0, "Seed of every random choice.", least=0)
+
+    def __post_init__(self) -> None:
+        for item in (item for item in fields(self) if item.name in PLAIN):
+            if self.refine != "none" and getattr(self, item.name) != item.default:
+                raise UsageError(f"{flag_of(item)}: is the plain method's; add --refine none")
 
     @property
     def display(self) -> Display:

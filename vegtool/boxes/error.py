@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
 
 from vegtool.arrays import FloatArray, IntArray
 from vegtool.lod import Billboards
@@ -67,6 +66,8 @@ def distance_to_mesh(points: FloatArray, mesh: Plant) -> FloatArray:
     Of the triangles under the nearest of many points spread over it: never too small, and exact
     where one of these triangles is the nearest.
     """
+    from scipy.spatial import cKDTree
+
     if not len(points):
         return np.zeros(0)
     face, samples = surface_samples(mesh, SAMPLES)

@@ -78,6 +78,7 @@ def _billboards(
     method: str, options: ReportOptions, budget: int, buffers: PlantBuffers, progress: Progress
 ) -> Made:
     convert = ConvertOptions(
+        refine="none",
         method=method,
         billboards=budget,
         fov=options.fov,
