@@ -24,7 +24,7 @@ from statistics import median
 from tempfile import TemporaryDirectory
 
 from judge.asked import checks, costs
-from judge.chains import PLAIN, can_be_plain, converted
+from judge.chains import PLAIN, converted
 from judge.plants import MODELS, QUICK, ROOT, wanted
 from judge.points import Point, points_of
 from judge.sitting import VIEWS
@@ -75,7 +75,7 @@ def main() -> int:
             for point in points_of(plant, model, known.options, sets, folder, known.cache):
                 found.append(point)
                 print(line(point), flush=True)
-            if known.time and can_be_plain():
+            if known.time:
                 times[plant] = seconds(model, found[-1].options, folder / "timed")
     asked = [*costs(found, times)]
     for views in sets:

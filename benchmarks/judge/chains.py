@@ -8,15 +8,16 @@ import shutil
 import struct
 import subprocess
 import sys
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from math import radians, tan
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
 from judge.photographs import FOV_DEG, SIZE
-from vegtool.convert import ConvertOptions
 from vegtool.formats.manifest import read_manifest
+from vegtool.lod import Display
+from vegtool.plant import Plant
 
 DISTANCES = (2.9, 5.8, 11.6)
 """Bounding radii: a tree is about 150, 75 and 38 pixels high."""
@@ -74,37 +75,34 @@ def converted(model: Path, folder: Path, options: str) -> Chain:
     return Chain(folder, read_manifest(folder / f"{model.stem}.lod.json"), options, seconds)
 
 
-def can_be_plain() -> bool:
-    """Whether this vegtool has another method than the plain one."""
-    return any(field.name == "refine" for field in fields(ConvertOptions))
-
-
 def limits(triangles: int) -> list[int]:
     """The most triangles at each of DISTANCES, for an original of so many."""
     return [max(triangles // share, LEAST) for share in SHARES]
 
 
-def within(model: Path, folder: Path, options: str, triangles: int, radius: float) -> Chain:
+def within(model: Path, folder: Path, options: str, plant: Plant) -> Chain:
     """A chain whose levels keep to `limits` where they are shown.
 
-    With as many billboards as they allow: fewer again wherever a level is shown farther away than
-    its triangles allow. --billboards among the options is left as it is.
+    Its first level is made for the first of DISTANCES, with as many billboards as are allowed
+    there; with fewer again wherever a level is shown farther away than its triangles allow.
+    --pixels and --billboards are left as they are where they stand among the options.
     """
-    allowed = limits(triangles)
+    allowed = limits(len(plant.faces))
     billboards = min(allowed[0] // 2, MOST_BILLBOARDS)
-    chosen = "--billboards" in options or "-b" in shlex.split(options)
+    # a little larger: distances are rounded up
+    near = Display(FOV_DEG, SIZE).pixels_per_metre(DISTANCES[0] * plant.radius)
+    pixels = "" if "--pixels" in options else f"--pixels {1.02 * near * plant.extent:.4g}"
+    chosen = bool({"--billboards", "-b"} & set(shlex.split(options)))
     for _ in range(ATTEMPTS):
-        told = options if chosen else f"--billboards {billboards} {options}".strip()
-        chain = converted(model, folder, told)
-        shown = [level_at(chain, radius * distance) for distance in DISTANCES]
-        room = min(
-            [
-                most / level["triangles"]
-                for level, most in zip(shown, allowed, strict=True)
-                if level["kind"] != "mesh"
-            ],
-            default=1.0,
-        )
+        count = "" if chosen else f"--billboards {billboards}"
+        chain = converted(model, folder, " ".join(filter(None, (count, pixels, options))))
+        shown = [level_at(chain, distance * plant.radius) for distance in DISTANCES]
+        shares = [
+            most / level["triangles"]
+            for level, most in zip(shown, allowed, strict=True)
+            if level["kind"] != "mesh"
+        ]
+        room = min(shares, default=1.0)
         if chosen or room >= 1:
             break
         billboards = int(room * billboards)

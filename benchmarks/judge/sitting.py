@@ -11,7 +11,6 @@ from judge.chains import (
     DISTANCES,
     PLAIN,
     Chain,
-    can_be_plain,
     converted,
     gltfpacked,
     level_at,
@@ -64,7 +63,7 @@ def sit(
     folder.mkdir()
     original = folder / "original.glb"
     original.write_bytes(plant_glb(plant))
-    chain = within(model, folder / "levels", options, len(plant.faces), plant.radius)
+    chain = within(model, folder / "levels", options, plant)
     shown = [level_at(chain, plant.radius * distance) for distance in DISTANCES]
     files = {
         Sitting.TRUTH: [original] * len(DISTANCES),
@@ -99,7 +98,7 @@ def _plain(
 
     Unmeasured: its levels are the same, and none is left out.
     """
-    if not can_be_plain() or PLAIN in chain.options:
+    if PLAIN in chain.options:
         return {}
     plain = converted(model, folder / "plain", f"{chain.options} {PLAIN} --measure off")
     return {Sitting.PLAIN: [plain.file(like(plain, level["triangles"])) for level in shown]}
