@@ -1,0 +1,102 @@
+"""Colours of a level such that what it covers is as bright as the truth.
+
+What a level shows is its colours times light, so its mean brightness is linear in a factor of its
+billboards and one of its mesh. Of all pairs of factors that bring it to that of the truth, on
+average over views, the nearest to 1 is taken: the part that makes up most of the picture changes
+most. Hues stay: where one is wrong on average, more of the wood or of the leaves is seen than
+should be, and a tinted trunk would be no remedy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vegtool.arrays import ByteArray, FloatArray, Picture
+from vegtool.gl.draw import Light
+from vegtool.lod import Level
+from vegtool.measure.metrics import LUMINANCE
+from vegtool.measure.scores import Truths
+from vegtool.refine.drawn import drawn
+from vegtool.srgb import linear_from_srgb, srgb_from_linear
+
+LEAST_GAIN, MOST_GAIN = 0.5, 2.0
+"""Farther off, it is not colour that is wrong."""
+
+
+@dataclass(frozen=True)
+class Shares:
+    """Of the truth's mean luminance, what billboards and mesh show: means over views, together 1
+    where nothing is wrong."""
+
+    billboards: float
+    mesh: float
+
+
+def unbiased_color(level: Level, truths: Truths) -> Level:
+    """The level with the colours of its atlas and of its mesh scaled, by a factor each.
+
+    What is compared is the mean linear luminance of what is covered, over all views and distances
+    of the truths, drawn as by a client without anisotropic filtering. Raises ValueError for a level
+    without billboards, CapabilityError where OpenGL cannot draw.
+    """
+    return scaled(level, *gains(shares(level, truths)))
+
+
+def shares(level: Level, truths: Truths) -> Shares:
+    """Draw the level, then its billboards beside a black mesh, and compare both with the truth."""
+    cameras = [camera for row in truths.cameras for camera in row]
+    lights = [Light(direction=view.sun) for _ in truths.cameras for view in truths.views]
+    true = np.array([reference.luminance for row in truths.references for reference in row])
+    whole = luminances(drawn(level, cameras, lights))
+    known = (true > 0) & (whole > 0)
+    if not known.any():
+        return Shares(1.0, 0.0)
+    total = float((whole[known] / true[known]).mean())
+    if level.mesh is None:
+        return Shares(total, 0.0)
+    part = luminances(drawn(scaled(level, 1.0, 0.0), cameras, lights))
+    billboards = float((part[known] / true[known]).mean())
+    return Shares(billboards, max(total - billboards, 0.0))
+
+
+def gains(shown: Shares) -> tuple[float, float]:
+    """Factors of billboards and mesh, the nearest to 1 with which the shares sum to 1."""
+    size = shown.billboards**2 + shown.mesh**2
+    step = (1 - shown.billboards - shown.mesh) / size if size > 0 else 0.0
+    billboards, mesh = (1 + step * part for part in (shown.billboards, shown.mesh))
+    return (
+        min(max(billboards, LEAST_GAIN), MOST_GAIN),
+        min(max(mesh, LEAST_GAIN), MOST_GAIN),
+    )
+
+
+def scaled(level: Level, billboards: float, mesh: float) -> Level:
+    """The level with linear colours times these factors; no channel gets brighter than 1."""
+    if level.atlas is None:
+        raise ValueError("unbiased_color: needs a level with billboards")
+    color = level.atlas.color.copy()
+    color[..., :3] = factor_table(billboards)[color[..., :3]]
+    if level.atlas.white is not None:
+        x, y, w, h = level.atlas.white.tolist()
+        color[y : y + h, x : x + w] = 255
+    level = replace(level, atlas=replace(level.atlas, color=color))
+    if level.mesh is None or level.mesh.colors is None:
+        return level
+    factors = level.mesh.colors.copy()
+    factors[:, :3] = np.clip(factors[:, :3] * mesh, 0.0, 1.0)
+    return replace(level, mesh=replace(level.mesh, colors=factors))
+
+
+def factor_table(factor: float) -> ByteArray:
+    """(256,) uint8: the sRGB bytes of linear light times a factor."""
+    light = np.minimum(linear_from_srgb(np.arange(256) / 255) * factor, 1.0)
+    return np.asarray(np.rint(255 * srgb_from_linear(light)), dtype=np.uint8)
+
+
+def luminances(pictures: Sequence[Picture]) -> FloatArray:
+    """(n,) mean linear luminance of what each picture covers; 0 of nothing."""
+    sums = np.stack([picture.sum(axis=(0, 1), dtype=np.float64) for picture in pictures])
+    return np.asarray(sums[:, :3] @ LUMINANCE / np.maximum(sums[:, 3], 1e-9))
