@@ -61,7 +61,7 @@ def test_json_names_the_files(
     assert run(["convert", str(model), "-o", str(tmp_path / "o"), "--json", *SMALL]) == 0
     (outcome,) = json.loads(capsys.readouterr().out)
     assert all(Path(f).is_file() for f in outcome["files"])
-    assert [row["kind"] for row in outcome["levels"]] == ["mesh", "billboards", "billboards"]
+    assert [row["kind"] for row in outcome["levels"]] == ["mesh", "hybrid", "hybrid"]
 
 
 def test_the_result_states_distances_and_errors(
@@ -190,6 +190,9 @@ def test_one_bad_file_does_not_stop_the_others(
         (["convert", "bush.glb", "-o", "out", "--billboards", "-3"], 2, "--billboards"),
         (["convert", "bush.glb", "-o", "out", "--billboards", "10000000"], 2, "--billboards"),
         (["convert", "bush.glb", "-o", "out", "--method", "magic"], 2, "magic"),
+        (["convert", "bush.glb", "-o", "out", "--method", "kmeans"], 2, "add --refine none"),
+        (["convert", "bush.glb", "-o", "out", "--refine", "some"], 2, "some"),
+        (["convert", "bush.glb", "-o", "out", "--pixels", "7"], 2, "--pixels: expected 8 to"),
         (["convert", "bush.glb", "-o", "out", "--unit", "parsec"], 2, "parsec"),
         (["convert", "bush.glb", "-o", "out", "--config", "none.toml"], 2, "none.toml"),
         (["convert", "bush.glb", "-o", "out", "--max-error", "-0.1"], 2, "--max-error"),
@@ -377,9 +380,11 @@ def test_verbose_says_where_the_time_went(
 ) -> None:
     arguments = ["convert", str(model), "--dry-run", *SMALL, "-o", str(tmp_path)]
     assert run(arguments) == 0
-    assert "clustering" not in capsys.readouterr().err
-    assert run([*arguments, "-v"]) == 0
-    assert "clustering" in capsys.readouterr().err
+    assert " s, " not in capsys.readouterr().err
+    for refine, stages in (("full", ("wood", "planes")), ("none", ("clustering", "boxes"))):
+        assert run([*arguments, "-v", "--refine", refine]) == 0
+        said = capsys.readouterr().err
+        assert all(f"{stage} 0." in said for stage in stages)
 
 
 @pytest.mark.parametrize("more", [[], ["--dry-run"]])
