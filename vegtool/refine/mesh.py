@@ -1,0 +1,46 @@
+"""Coloured meshes without textures, the opaque part of a level, joined into one plant."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+
+from vegtool.arrays import FloatArray, IntArray
+from vegtool.plant import Material, Plant
+
+
+class ColoredMesh(Protocol):
+    """positions (v, 3) metres, normals (v, 3) unit, colors (v, 3) linear, faces (t, 3) int32."""
+
+    @property
+    def positions(self) -> FloatArray: ...
+    @property
+    def normals(self) -> FloatArray: ...
+    @property
+    def colors(self) -> FloatArray: ...
+    @property
+    def faces(self) -> IntArray: ...
+
+
+def joined(parts: Sequence[ColoredMesh | None], name: str = "mesh") -> Plant | None:
+    """All parts as a plant with one opaque, double-sided material, as `Level.mesh` wants it; None
+    where no part has a face."""
+    some = [part for part in parts if part is not None and len(part.faces)]
+    if not some:
+        return None
+    before = np.cumsum([0, *(len(part.positions) for part in some[:-1])])
+    positions = np.concatenate([part.positions for part in some])
+    colors = np.concatenate([part.colors for part in some])
+    faces = np.concatenate([p.faces + b for p, b in zip(some, before, strict=True)])
+    return Plant(
+        name,
+        positions,
+        np.concatenate([part.normals for part in some]),
+        np.zeros((len(positions), 2)),
+        faces.astype(np.int32),
+        np.zeros(len(faces), dtype=np.int32),
+        (Material(name, double_sided=True),),
+        np.concatenate([colors, np.ones((len(colors), 1))], axis=1),
+    )
