@@ -36,10 +36,8 @@ WRONG = 0.06
 """Wood that wrong made a FLIP of 0.019, 0.016 and 0.013 of pictures of 121, 61 and 30 pixels per
 radius of five plants, with all of their leaves; 0.04 makes 0.016, 0.014 and 0.011, and takes twice
 as many triangles."""
-LEAST = 24
-"""Triangles, if a level has twice as many: for the look of a trunk that covers next to nothing."""
-MOST = 0.5
-"""Of a level's triangles."""
+LEAST, MOST = 0.03, 0.5
+"""Of a level's triangles. The least is for the look of a trunk that covers next to nothing."""
 ROUNDS = 48
 """Of the bisection for the price."""
 CLOSE = 1e-3
@@ -103,7 +101,7 @@ def reduced_wood(stems: Stems, triangles: int, pixel_m: float) -> Wood | None:
 
 def wood_triangles(stems: Stems, triangles: int, pixel_m: float) -> int:
     """How many of a level's triangles its wood deserves: as many as it takes until no more of it is
-    drawn wrongly than WRONG of what the plant covers, but LEAST, and at most MOST of all.
+    drawn wrongly than WRONG of what the plant covers; at least LEAST and at most MOST of all.
 
     pixel_m: metres that a pixel covers, where the level is seen from nearest. Raises ValueError
     where that is not a length.
@@ -111,7 +109,7 @@ def wood_triangles(stems: Stems, triangles: int, pixel_m: float) -> int:
     screen = Screen.of(stems, pixel_m)
     wrong = WRONG * stems.covered / screen.pixel**2
     enough = _last(screen, lambda choice: choice.wrong > wrong).triangles
-    return min(max(enough, LEAST), int(MOST * triangles))
+    return min(max(enough, int(LEAST * triangles)), int(MOST * triangles))
 
 
 def _last(screen: Screen, holds: Callable[[Choice], bool]) -> Choice:

@@ -43,6 +43,12 @@ def ends(line: Ints) -> tuple[Ints, Ints]:
     return last - count + 1, last
 
 
+def taper_areas(girth: FloatArray, length: FloatArray) -> FloatArray:
+    """(n - 1,) surfaces of round tapers between girths (n,), each as long as `length`, (n - 1,)."""
+    slant = np.hypot(length, np.diff(girth) / (2 * np.pi))
+    return np.asarray((girth[1:] + girth[:-1]) / 2 * np.where(length > 0, slant, 0.0))
+
+
 def lines_of(parts: Parts, rings: Skeleton, tubes: Tubes) -> Lines:
     """One line for each tube: the longest chain of its rings, after the ring of another that it
     forks from; where it has but one ring, from that ring's farthest vertex to the other side."""

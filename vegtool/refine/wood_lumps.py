@@ -119,7 +119,9 @@ def _normals(positions: FloatArray, faces: Ints) -> FloatArray:
     """
     normal = _area_vectors(positions[faces])
     total = [np.bincount(faces.ravel(), np.repeat(n, 3), len(positions)) for n in normal.T]
-    return unit(np.stack(total, axis=1))
+    mean = np.stack(total, axis=1).astype(np.float64)
+    mean[np.linalg.norm(mean, axis=1) < 1e-12 * np.abs(mean).max()] = [0.0, 1.0, 0.0]
+    return unit(mean)
 
 
 def _colors(surface: Surface, positions: FloatArray) -> FloatArray:

@@ -8,11 +8,14 @@ import numpy as np
 
 from vegtool.arrays import FloatArray, unit
 from vegtool.refine.wood_choice import SECTIONS, Choice, Section
-from vegtool.refine.wood_lines import Ints, ends
+from vegtool.refine.wood_lines import Ints, ends, taper_areas
 from vegtool.refine.wood_stems import Stems
 
 FITTING = 3
 """Rounds in which girths are brought to give every stretch its surface."""
+LEAST = 0.05
+"""Of a stem's mean girth, but at points: what closes at both ends still has its surface."""
+TINY = float(np.finfo(float).tiny)
 GOLDEN = (5**0.5 - 1) / 2
 
 
@@ -87,17 +90,20 @@ def straightened(stems: Stems, choice: Choice) -> Tapers:
 
     surface = around(stems.area)
     color = around(np.concatenate([stems.color[:, :, None], stems.swing], axis=2))
-    color /= np.maximum(surface, np.finfo(float).tiny)[:, None, None]
-    girth = np.where(choice.pointed[stem] & (node == stems.last[stem]), 0.0, stems.girth[node])
+    color /= np.maximum(surface, TINY)[:, None, None]
     length = np.where(inner, np.linalg.norm(np.diff(at, axis=0), axis=1), 0.0)
+    whole = np.bincount(stem, surface, len(stems)) / 2
+    least = LEAST * whole / np.maximum(np.bincount(stem[1:], length, len(stems)), TINY)
+    girth = np.maximum(stems.girth[node], least[stem])
+    girth[choice.pointed[stem] & (node == stems.last[stem])] = 0.0
     for _ in range(FITTING):
-        taper = (girth[1:] + girth[:-1]) / 2 * length
+        taper = taper_areas(girth, length)
         made = np.append(0.0, taper) + np.append(taper, 0.0)
         girth = girth * np.divide(surface, made, out=np.ones_like(girth), where=made > 0)
-    made = np.bincount(stem[1:], (girth[1:] + girth[:-1]) / 2 * length, len(stems)).astype(float)
-    whole = np.bincount(stem, surface, len(stems)) / 2
-    scale = np.divide(whole, made, out=np.ones_like(made), where=made > 0) * choice.wider
-    return Tapers(at, girth * scale[stem], color, stem, stems.facing[stem])
+    for _ in range(FITTING):
+        made = np.bincount(stem[1:], taper_areas(girth, length), len(stems)).astype(float)
+        girth = girth * np.divide(whole, made, out=np.ones_like(made), where=made > 0)[stem]
+    return Tapers(at, girth * choice.wider[stem], color, stem, stems.facing[stem])
 
 
 def joined(stems: Stems, node: Ints, shown: np.ndarray) -> FloatArray:
@@ -117,7 +123,7 @@ def joined(stems: Stems, node: Ints, shown: np.ndarray) -> FloatArray:
         after = np.searchsorted(node, end)
         a, b = node[after - 1], node[after]
         line = stems.node[b] - stems.node[a]
-        square = np.maximum((line**2).sum(axis=1), np.finfo(float).tiny)
+        square = np.maximum((line**2).sum(axis=1), TINY)
         along = np.clip(((foot - stems.node[a]) * line).sum(axis=1) / square, 0, 1)[:, None]
         at[stems.first[child]] = at[a] * (1 - along) + at[b] * along
     return at

@@ -22,7 +22,7 @@ from vegtool.branches.skeleton import skeleton
 from vegtool.branches.tubes import cut_tubes
 from vegtool.plant import Plant
 from vegtool.refine.wood_color import face_colors
-from vegtool.refine.wood_lines import Ints, Lines, lines_of, uneven
+from vegtool.refine.wood_lines import Ints, Lines, lines_of, taper_areas, uneven
 from vegtool.refine.wood_lumps import Lump, Surface, lumps
 from vegtool.refine.wood_seen import seen_through
 
@@ -200,12 +200,13 @@ def first_alike(labels: Ints) -> Ints:
 
 
 def rough_parts(lines: Lines, area: FloatArray, rough: FloatArray, part: Ints) -> Ints:
-    """Parts of the wood that are no tubes and large enough to matter, rough: (t,) by line."""
+    """Parts of the wood that are one tube, not round, and large enough to matter."""
     on_line = np.bincount(lines.line[lines.owner], area, len(rough))
     thick = np.bincount(lines.line, lines.girth) / np.bincount(lines.line) / (2 * np.pi)
     part_area = np.bincount(part, on_line)
     not_round = np.bincount(part, on_line * rough) > ROUGH * np.bincount(part, on_line * thick)
-    return np.flatnonzero(not_round & (part_area > MATTERS * part_area.sum()))
+    alone = np.bincount(part) == 1  # what forks would have its thin arms collapsed first
+    return np.flatnonzero(alone & not_round & (part_area > MATTERS * part_area.sum()))
 
 
 def colors(lines: Lines, middle: FloatArray, color: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -223,8 +224,8 @@ def colors(lines: Lines, middle: FloatArray, color: FloatArray) -> tuple[FloatAr
 def true_girth(lines: Lines, area: FloatArray) -> FloatArray:
     """Girths (n,) that give the tapers between nodes the surface that stands there, area (n,)."""
     girth, inner = lines.girth, lines.line[1:] == lines.line[:-1]
-    length = np.linalg.norm(np.diff(lines.node, axis=0), axis=1)
-    taper = np.where(inner, (girth[1:] + girth[:-1]) / 2 * length, 0.0)
+    length = np.where(inner, np.linalg.norm(np.diff(lines.node, axis=0), axis=1), 0.0)
+    taper = taper_areas(girth, length)
     around = np.append(0.0, taper) + np.append(taper, 0.0)
     there = area + np.append(np.where(inner, area[1:], 0.0), 0.0)
     ratio = np.divide(there, around, out=np.ones_like(girth), where=around > 0)
