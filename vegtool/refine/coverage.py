@@ -10,15 +10,18 @@ distances, is what the picture covers.
 
 Alpha as baked, the mean coverage of a texel, ranks texels: what is covered most passes first.
 Where nothing is covered the nearer to the shape, and where all is covered the farther from its
-edge, so that shapes grow and shrink by their outline and holes stay holes. Ranks are mapped to
-alpha linearly, which interpolation and averaging keep: so all that a client will ever sample can be
-ranked as it would be, and a histogram of that gives every threshold at once.
+edge, so that shapes grow and shrink by their outline and holes stay holes. What is averaged are
+exponentials of the ranks, as exponential shadow maps do (Annen, Mertens, Seidel, Flerackers, Kautz
+2008): a mean of exponentials lies near the greatest of them, so that the mips of thin and sparse
+things still pass. Alpha is linear in them, which interpolation and averaging keep: so all that a
+client will ever sample can be ranked as it would be, and a histogram gives every threshold at once.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -30,7 +33,11 @@ from vegtool.lod import Atlas, Level
 
 PASS = 127.5
 """Alpha of 255 at the client's cutoff."""
-STEP = 4.0
+EXPONENT = 5.0
+"""How much more a texel weighs that is covered than one that is not, as a logarithm. With 0, the
+coverage of a leaf's billboard falls to two thirds two mips down; with 5 to nine tenths, and with 10
+it rises."""
+STEP = 1.0
 """Ranks, of 255, per texel of distance from the outline of a shape."""
 FARTHEST = 4
 """Texels by which a shape may grow or shrink."""
@@ -40,6 +47,10 @@ SAMPLES = 1_500_000
 """That rank all that a client samples of an atlas, as near as whole samples per texel allow."""
 MOST_SAMPLES = 4
 """Per axis and texel."""
+LEAST_SHARE = 1e-3
+"""Mips that are sampled less do not count."""
+LEAST_SPAN = 1e-3
+"""Of a threshold's weight: keeps the slope finite where a picture has one rank only."""
 ANGLES, TURNS, DISTANCES = 64, 8, 9
 """Samples of the directions and distances from which a billboard is seen."""
 
@@ -48,11 +59,11 @@ ANGLES, TURNS, DISTANCES = 64, 8, 9
 class Ranks:
     """Ranks of the texels of p pictures, 0 to 255 and beyond.
 
-    rank: (h, w), gutters included. owner: (h, w) int32 picture of each texel, and `grown` the same
-    with gutters; -1 for none. covered, area: (p,) texels.
+    weight: (h, w) exponentials of the ranks, gutters included. owner: (h, w) int32 picture of each
+    texel, and `grown` the same with gutters; -1 for none. covered, area: (p,) texels.
     """
 
-    rank: SingleArray
+    weight: SingleArray
     owner: IntArray
     grown: IntArray
     covered: FloatArray
@@ -113,7 +124,7 @@ def ranked(alpha: ByteArray, rects: IntArray, gutter: int) -> Ranks:
         grown[around] = index
     count = len(rects)
     return Ranks(
-        rank,
+        weight_of(rank),
         owner,
         grown,
         np.bincount(owner[inside], coverage[inside] / 255, count).astype(np.float64),
@@ -121,11 +132,21 @@ def ranked(alpha: ByteArray, rects: IntArray, gutter: int) -> Ranks:
     )
 
 
+def weight_of(rank: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """The exponential of ranks."""
+    return np.asarray(np.exp(rank * np.float32(EXPONENT / 255)))
+
+
+def rank_of(weight: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """The rank whose exponential that is."""
+    return np.asarray(np.log(weight) * np.float32(255 / EXPONENT))
+
+
 def _distance(within: npt.NDArray[np.bool_]) -> SingleArray:
     """(h, w) texels from the nearest texel that is not within; far where all are."""
     if within.all():
         return np.full(within.shape, np.inf, np.float32)
-    return distance_transform_edt(within).astype(np.float32)
+    return np.asarray(distance_transform_edt(within), dtype=np.float32)
 
 
 def seen_at(density: float, reach: float) -> FloatArray:
@@ -155,45 +176,43 @@ def thresholds(ranks: Ranks, target: FloatArray, seen: FloatArray) -> FloatArray
     seen: (m,) shares of MIPS.
     """
     count = len(target)
-    low = float(ranks.rank.min(initial=0.0))
-    bins = int(np.ceil(float(ranks.rank.max(initial=0.0)) - low)) + 2
+    low, high = rank_of(ranks.weight.min(initial=1.0)), rank_of(ranks.weight.max(initial=1.0))
+    bins = int(np.ceil(high - low)) + 2
     found = np.zeros((count, bins))
-    for owner, rank, share in sampled(ranks, seen):
-        place = owner * bins + (rank - low + 0.5).astype(np.int64)
+    for owner, weight, share in sampled(ranks.weight, ranks.owner, seen):
+        place = owner * bins + (rank_of(weight) - (low - 0.5)).astype(np.int64)
         found += share * np.bincount(place, minlength=count * bins).reshape(count, bins)
     total = np.maximum(found.sum(axis=1, keepdims=True), np.finfo(float).tiny)
     passing = np.cumsum(found[:, ::-1], axis=1)[:, ::-1] / total * ranks.area[:, None]
     best = np.abs(passing - target[:, None]).argmin(axis=1)
-    return np.asarray(best + low - 0.5)
+    return np.asarray(best + low - 0.5, dtype=np.float64)
 
 
-def sampled(ranks: Ranks, seen: FloatArray) -> Iterator[tuple[IntArray, SingleArray, float]]:
-    """What a client samples of the pictures: their owners, the ranks, and the share of those."""
-    height, width = ranks.rank.shape
-    per_texel = np.sqrt(SAMPLES / max(height * width * np.count_nonzero(seen > 1e-3), 1))
+def sampled(
+    values: SingleArray, owner: IntArray, seen: FloatArray
+) -> Iterator[tuple[IntArray, SingleArray, float]]:
+    """What a client samples of an image (h, w) in pictures: their numbers, the values, and the
+    share of those; mip after mip, for shares (m,) of MIPS."""
+    height, width = values.shape
+    per_texel = np.sqrt(SAMPLES / max(height * width * np.count_nonzero(seen > LEAST_SHARE), 1))
     n = int(np.clip(per_texel, 1, MOST_SAMPLES))
     # in the middle of texels nothing is interpolated: one sample stands between middle and corner
     shift = 0.25 if n == 1 else 0.0
     y, x = ((np.arange(size * n) + 0.5) / n + shift for size in (height, width))
-    owner = np.repeat(np.repeat(ranks.owner, n, axis=0), n, axis=1)
+    owner = np.repeat(np.repeat(owner, n, axis=0), n, axis=1)
     inside = owner >= 0
     owner = owner[inside]
-    levels = [ranks.rank]
-    for _ in range(int(MIPS[-1]) + 1):
-        levels.append(halved(levels[-1]))
-    images: dict[int, SingleArray] = {}
-
-    def image(level: int) -> SingleArray:
-        if level not in images:
-            scale = 2.0**level
-            images[level] = interpolated(levels[level], y / scale, x / scale)[inside]
-        return images[level]
-
+    mips = [values]
+    images: list[SingleArray] = []
     for mip, share in zip(MIPS, seen, strict=True):
-        if share > 1e-3:
-            lower, part = int(mip), np.float32(mip % 1)
-            rank = image(lower)
-            yield owner, (rank + part * (image(lower + 1) - rank) if part else rank), share
+        if share <= LEAST_SHARE:
+            continue
+        lower, part = int(mip), np.float32(mip % 1)
+        for scale in range(len(images), lower + 2):
+            images.append(interpolated(mips[scale], y / 2**scale, x / 2**scale)[inside])
+            mips.append(halved(mips[scale]))
+        image = images[lower]
+        yield owner, (image + part * (images[lower + 1] - image) if part else image), share
 
 
 def halved(values: SingleArray) -> SingleArray:
@@ -216,18 +235,17 @@ def interpolated(values: SingleArray, y: FloatArray, x: FloatArray) -> SingleArr
 
 
 def mapped(alpha: ByteArray, ranks: Ranks, threshold: FloatArray) -> ByteArray:
-    """Alpha linear in rank, PASS at the threshold, as steep as 0 to 255 allow in each picture."""
-    count = len(threshold)
+    """Alpha linear in weight, PASS at the threshold, as steep as 0 to 255 allow in each picture."""
     inside = ranks.owner >= 0
-    owner, rank = ranks.owner[inside], ranks.rank[inside]
-    low, high = np.full(count, np.inf), np.full(count, -np.inf)
-    np.minimum.at(low, owner, rank)
-    np.maximum.at(high, owner, rank)
-    span = np.maximum(threshold - low, high - threshold)
-    plain = (ranks.covered > 0) & (ranks.covered < ranks.area)
-    slope = np.where(plain, PASS / np.maximum(span, 0.5), 0.0)
+    owner, weight = ranks.owner[inside], ranks.weight[inside].astype(np.float64)
+    low, high = np.full(len(threshold), np.inf), np.zeros(len(threshold))
+    np.minimum.at(low, owner, weight)
+    np.maximum.at(high, owner, weight)
+    middle = weight_of(threshold)
+    span = np.maximum(np.maximum(middle - low, high - middle), LEAST_SPAN * middle)
+    some = (ranks.covered > 0) & (ranks.covered < ranks.area)
+    slope = np.where(some, PASS / span, 0.0)
     grown = ranks.grown
-    value = PASS + slope[grown] * (ranks.rank - threshold[grown])
-    result = np.clip(np.round(value), 0, 255).astype(np.uint8)
-    keep = (grown < 0) | ~plain[grown]
-    return np.where(keep, alpha, result)
+    value = PASS + slope[grown] * (ranks.weight - middle[grown])
+    fitted = np.clip(np.round(value), 0, 255).astype(np.uint8)
+    return np.where((grown >= 0) & some[grown], fitted, alpha)
