@@ -173,7 +173,7 @@ def report_command(
 
         vegtool report oak.glb -o out/
 
-        vegtool report models/ -o out/ --methods branches,kmeans --budgets 64,256
+        vegtool report models/ -o out/ --methods refined,branches --budgets 64,256
 
         vegtool report --stability
     """

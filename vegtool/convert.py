@@ -8,7 +8,9 @@ per pixel at that size. From where it may be used is measured then (measure/chai
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields, replace
+from functools import partial
 from math import log
 from typing import TYPE_CHECKING, cast, get_args
 
@@ -27,6 +29,7 @@ from vegtool.timing import timed
 
 if TYPE_CHECKING:
     from vegtool.baking.bake import PlantBuffers
+    from vegtool.measure.scores import TruthsAt
 
 LEVEL_RATIO = 2
 """Each level has half the billboards of the one before, for half its size on the screen."""
@@ -154,7 +157,6 @@ def convert(
     from vegtool.measure.chain import views_of, with_distances
     from vegtool.measure.distances import rounded_up
     from vegtool.measure.scores import TruthsAt
-    from vegtool.refine.level import refined_level, source_of
 
     options, measure = options or ConvertOptions(), measure or MeasureOptions()
     check_limits(options)
@@ -164,7 +166,7 @@ def convert(
     counts = billboard_counts(plant, options)
     with PlantBuffers(plant) as buffers:
         truth_at = TruthsAt(plant, views_of(measure), options.display, buffers)
-        source = source_of(buffers, truth_at) if options.refine == "full" else None
+        make = level_maker(buffers, truth_at, options)
         for index, count in enumerate(counts):
 
             def report(stage: str, fraction: float, index: int = index) -> None:
@@ -173,17 +175,7 @@ def convert(
 
             size = (options.pixels or near_pixels(counts[0])) / LEVEL_RATIO**index
             near = rounded_up(distance_of(plant, options.display, max(size, NEAR_LIMITS[0])))
-            if source is None:
-                level = billboard_level(buffers, options, count, near, report)
-            else:
-                level = refined_level(
-                    source,
-                    TRIANGLES_PER_BILLBOARD * count,
-                    near,
-                    options.max_texture,
-                    options.seed,
-                    report,
-                )
+            level = make(count, near, report)
             saves = level.triangles <= MOST_OF_PREVIOUS * levels[-1].triangles
             if saves or (index == len(counts) - 1 and len(levels) == 1):
                 levels.append(level)
@@ -198,6 +190,29 @@ def convert(
     progress("levels", 1.0)
     told = {**asdict(options), **asdict(measure)}
     return LodChain(plant.name, (levels[0], *kept), options.display, options.seed, told, notes)
+
+
+LevelMaker = Callable[[int, float, Progress], Level]
+"""Makes a level of at most so many billboards, or so many triangles twice over, for distances from
+so many metres on."""
+
+
+def level_maker(buffers: PlantBuffers, truth_at: TruthsAt, options: ConvertOptions) -> LevelMaker:
+    """What makes the levels of a plant, by `options.refine`; all that they share is made here.
+
+    buffers: the plant's, without mipmaps. truth_at: what it looks like.
+    """
+    if options.refine == "none":
+        return partial(billboard_level, buffers, options)
+    from vegtool.refine.level import refined_level, source_of
+
+    source = source_of(buffers, truth_at)
+
+    def make(count: int, near_m: float, progress: Progress) -> Level:
+        most = TRIANGLES_PER_BILLBOARD * count
+        return refined_level(source, most, near_m, options.max_texture, options.seed, progress)
+
+    return make
 
 
 def billboard_level(

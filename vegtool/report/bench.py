@@ -18,9 +18,10 @@ from vegtool.measure.bounds import (
     projection_error,
     texel_error,
 )
-from vegtool.measure.chain import HELD_OUT_PHASE
+from vegtool.measure.chain import HELD_OUT_PHASE, views_of
 from vegtool.measure.cost import Cost, cost, peak_memory
-from vegtool.measure.scores import Truths, scores, truths
+from vegtool.measure.options import MeasureOptions
+from vegtool.measure.scores import Truths, TruthsAt, scores, truths
 from vegtool.measure.views import Camera, views
 from vegtool.plant import Plant
 from vegtool.progress import Progress, silent
@@ -37,11 +38,13 @@ TOLERATED_PIXELS = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """buffers: the plant's, without mipmaps. others: truths from other views under other suns, to
-    check --max-error with, where there is one."""
+    """buffers: the plant's, without mipmaps. truth_at: what levels are made by. truths: what rows
+    are measured by. others: from other views under other suns, to check --max-error with, where
+    there is one."""
 
     buffers: PlantBuffers
     options: ReportOptions
+    truth_at: TruthsAt
     truths: Truths
     others: Truths | None
     scene: Scene
@@ -62,7 +65,9 @@ def set_up(buffers: PlantBuffers, options: ReportOptions, progress: Progress = s
         )
 
     others = None if options.max_error is None else drawn(HELD_OUT_PHASE)
-    return Bench(buffers, options, drawn(0.0), others, watched)
+    seen_from = views_of(MeasureOptions(views=options.views))
+    truth_at = TruthsAt(buffers.plant, seen_from, options.display, buffers)
+    return Bench(buffers, options, truth_at, drawn(0.0), others, watched)
 
 
 def measured(
@@ -70,7 +75,9 @@ def measured(
 ) -> tuple[Row, Pictures]:
     """Make what an entry shows and measure it; its pictures at the sizes asked for."""
     with peak_memory() as peak:
-        made = entry.make(bench.buffers, lambda stage, done: progress(stage, 0.3 * done))
+        made = entry.make(
+            bench.buffers, bench.truth_at, lambda stage, done: progress(stage, 0.3 * done)
+        )
     found = scores(bench.truths, made.shown, lambda stage, done: progress(stage, 0.3 + 0.6 * done))
     progress("frame time", 0.9)
     level = made.shown if isinstance(made.shown, Level) else made.shown(bench.truths.views[0])

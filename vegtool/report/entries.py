@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 from vegtool.baselines import BASELINES, baseline
 from vegtool.convert import (
     TRIANGLES_PER_BILLBOARD,
-    ConvertOptions,
-    billboard_level,
+    level_maker,
     near_pixels,
 )
 from vegtool.errors import CapabilityError
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Level
+from vegtool.measure.scores import TruthsAt
 from vegtool.measure.views import View, distance_of
 from vegtool.progress import Progress
-from vegtool.report.options import ReportOptions
+from vegtool.report.options import FAMILIES, ReportOptions
 from vegtool.report.rows import LIVE
+from vegtool.timing import timed
 
+Maker = Callable[[PlantBuffers, TruthsAt, Progress], "Made"]
+"""From a plant's buffers, without mipmaps, and what it looks like: what an entry shows."""
 Shown = Level | Callable[[View], Level]
 """A level, or the one that is shown in a view."""
 
@@ -40,15 +43,15 @@ class Made:
 class Entry:
     """A row to be: its name, unique within a plant; its family; the budget of billboards, or None.
 
-    made_for_pixels: size on screen that it is made for, or None. make: from the plant's buffers
-    (without mipmaps), what is shown; raises CapabilityError where it cannot be made here.
+    made_for_pixels: size on screen that it is made for, or None. make: raises CapabilityError where
+    it cannot be made here.
     """
 
     name: str
     family: str
     budget: int | None
     made_for_pixels: float | None
-    make: Callable[[PlantBuffers, Progress], Made]
+    make: Maker
 
 
 def entries(options: ReportOptions) -> list[Entry]:
@@ -56,7 +59,7 @@ def entries(options: ReportOptions) -> list[Entry]:
     budgets = options.budget_counts[::-1]
     found = [Entry(LIVE, LIVE, None, None, _original)]
     for method in options.method_names:
-        make = partial(_billboards, method, options)
+        make = partial(_level, method, options)
         found += [_budgeted(method, budget, partial(make, budget)) for budget in budgets]
     for name, maker in BASELINES.items():
         if maker.budgeted:
@@ -66,36 +69,44 @@ def entries(options: ReportOptions) -> list[Entry]:
     return found
 
 
-def _budgeted(family: str, budget: int, make: Callable[[PlantBuffers, Progress], Made]) -> Entry:
+def _budgeted(family: str, budget: int, make: Maker) -> Entry:
     return Entry(f"{family} {budget}", family, budget, near_pixels(budget), make)
 
 
-def _original(buffers: PlantBuffers, progress: Progress) -> Made:
-    return _made(Level("mesh", mesh=buffers.plant, geometric_error_m=(0.0, 0.0)))
+def _original(buffers: PlantBuffers, truth_at: TruthsAt, progress: Progress) -> Made:
+    level = Level("mesh", mesh=buffers.plant, geometric_error_m=(0.0, 0.0))
+    return Made(level, level.triangles, level.texels, dict)
 
 
-def _billboards(
-    method: str, options: ReportOptions, budget: int, buffers: PlantBuffers, progress: Progress
+def _level(
+    family: str,
+    options: ReportOptions,
+    budget: int,
+    buffers: PlantBuffers,
+    truth_at: TruthsAt,
+    progress: Progress,
 ) -> Made:
-    convert = ConvertOptions(
-        refine="none",
-        method=method,
+    """A level of a family, all that it needs made for it alone."""
+    convert = replace(
+        FAMILIES[family],
         billboards=budget,
         fov=options.fov,
         image_height=options.image_height,
         seed=options.seed,
     )
     near_m = distance_of(buffers.plant, options.display, near_pixels(budget))
-    return _made(billboard_level(buffers, convert, budget, near_m, progress))
+    seconds: dict[str, float] = {}
+    with timed(seconds, "plant"):
+        make = level_maker(buffers, truth_at, convert)
+    level = make(budget, near_m, progress)
+    return Made(level, level.triangles, level.texels, lambda: {**seconds, **level.seconds})
 
 
-def _baseline(name: str, budget: int, buffers: PlantBuffers, progress: Progress) -> Made:
+def _baseline(
+    name: str, budget: int, buffers: PlantBuffers, truth_at: TruthsAt, progress: Progress
+) -> Made:
     progress(name, 0.0)
     found = baseline(buffers.plant, name, TRIANGLES_PER_BILLBOARD * budget)
     if found.level is None:
         raise CapabilityError(found.missing)
     return Made(found.level, found.triangles, found.texels, lambda: found.seconds)
-
-
-def _made(level: Level) -> Made:
-    return Made(level, level.triangles, level.texels, lambda: level.seconds)

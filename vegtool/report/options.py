@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from vegtool.clustering import METHODS
@@ -10,6 +11,12 @@ from vegtool.errors import UsageError
 from vegtool.lod import Display
 from vegtool.measure.options import MeasureOptions
 from vegtool.options import option, same_option
+
+FAMILIES: Mapping[str, ConvertOptions] = {
+    "refined": ConvertOptions(),
+    **{method: ConvertOptions(refine="none", method=method) for method in METHODS},
+}
+"""What is compared, and by which options `convert` makes it."""
 
 
 @dataclass(frozen=True)
@@ -20,7 +27,7 @@ class ReportOptions:
     """
 
     methods: str = option(
-        ",".join(METHODS), "Methods to compare, with commas between.", metavar="NAME,..."
+        ",".join(FAMILIES), "Methods to compare, with commas between.", metavar="NAME,..."
     )
     budgets: str = option(
         "16,64,256,1024", "Billboards of each method, with commas between.", metavar="N,..."
@@ -45,10 +52,10 @@ class ReportOptions:
     def method_names(self) -> tuple[str, ...]:
         """The methods, in the order given."""
         names = _words(self.methods)
-        wrong = [name for name in names if name not in METHODS]
+        wrong = [name for name in names if name not in FAMILIES]
         if wrong or not names:
             found = ", ".join(wrong) or "none"
-            raise UsageError(f"--methods: expected some of {', '.join(METHODS)}; got {found}")
+            raise UsageError(f"--methods: expected some of {', '.join(FAMILIES)}; got {found}")
         return names
 
     @property

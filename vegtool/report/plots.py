@@ -36,6 +36,7 @@ IN_PAGE = {INK: "var(--ink)", FAINT: "var(--faint)", LINE: "var(--line)", PAPER:
 """What an SVG takes from its page instead."""
 DASHED = (0, (4, 3))
 LOOKS: dict[str, tuple[str, str]] = {
+    "refined": ("#8250c4", "p"),
     "branches": ("#009e73", "o"),
     "isodata": ("#0072b2", "s"),
     "kmeans": ("#e69f00", "^"),
