@@ -1,0 +1,79 @@
+"""How much of a piece of surface is seen, averaged over all directions.
+
+Planes are to be spent on what is seen: of a dense crown that is its outside. Light is taken to pass
+foliage as a turbid medium (Monsi, Saeki: Über den Lichtfaktor in den Pflanzengesellschaften, 1953):
+in a column of space, a piece is seen through those before it with a probability that falls
+exponentially with the surface they turn towards the viewer.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vegtool.arrays import FloatArray, unit
+from vegtool.plant import Plant
+from vegtool.refine.planes_pieces import Pieces, tensor
+
+DIRECTIONS = 24
+"""From both ends of each."""
+COLUMN = 3.0
+"""Side of a column, in sizes of a piece."""
+POINTS = np.array([[4, 1, 1], [1, 4, 1], [1, 1, 4], [2, 2, 2]]) / 6
+"""Barycentric, where a face's texture is looked at."""
+
+
+def seen(pieces: Pieces, surface: float, size: float, opacity: float) -> FloatArray:
+    """(n,) 0 to 1: the share of directions from which a piece shows, by how much it turns there.
+
+    surface: of all, squared radii; weights are shares of it. size: of a piece, radii. opacity: the
+    share of a piece that hides what is behind it.
+    """
+    if size == 0:
+        return np.ones(len(pieces))
+    total = np.zeros(len(pieces))
+    shown = np.zeros(len(pieces))
+    for direction in even_directions(DIRECTIONS):
+        turned = np.sqrt(np.maximum(pieces.looks @ tensor(direction[None])[0], 0.0))
+        depth = opacity * surface * pieces.weight * turned / (COLUMN * size) ** 2
+        across = np.cross(direction, np.eye(3)[np.abs(direction).argmin()])
+        sides = unit(np.stack([across, np.cross(direction, across)]))
+        cell = np.floor(pieces.middle @ sides.T / (COLUMN * size)).astype(np.int64)
+        column = np.unique(cell, axis=0, return_inverse=True)[1].ravel()
+        order = np.lexsort((pieces.middle @ direction, column))
+        through = np.cumsum(depth[order]) - depth[order]
+        behind = np.empty(len(pieces))
+        behind[order] = through
+        whole = np.bincount(column, depth)
+        behind -= (np.cumsum(whole) - whole)[column]
+        before = whole[column] - behind - depth
+        total += turned * (np.exp(-np.maximum(before, 0)) + np.exp(-np.maximum(behind, 0))) / 2
+        shown += turned
+    return np.divide(total, shown, out=np.ones_like(total), where=shown > 0)
+
+
+def even_directions(count: int) -> FloatArray:
+    """(count, 3) unit vectors, spread evenly over half a sphere along a golden spiral."""
+    i = np.arange(count) + 0.5
+    z = 1 - i / count
+    turn = np.pi * i * (1 + 5**0.5)
+    r = np.sqrt(1 - z * z)
+    return np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1)
+
+
+def opacity(plant: Plant) -> float:
+    """The share of a plant's surface that its materials do not cut away."""
+    passing = np.ones(len(plant.faces))
+    for index, material in enumerate(plant.materials):
+        texture = material.color_texture
+        rows = np.flatnonzero(plant.face_material == index)
+        if texture is None or material.alpha_mode == "opaque" or not len(rows):
+            continue
+        height, width = texture.pixels.shape[:2]
+        at = np.einsum("pc,fci->fpi", POINTS, plant.uvs[plant.faces[rows]]) % 1.0
+        x = np.minimum((at[..., 0] * width).astype(np.int64), width - 1)
+        y = np.minimum((at[..., 1] * height).astype(np.int64), height - 1)
+        alpha = texture.pixels[y, x, 3] / 255 * material.base_color[3]
+        passing[rows] = (alpha >= material.alpha_cutoff).mean(axis=1)
+    area = plant.face_areas
+    total = float(area.sum())
+    return float(area @ passing) / total if total > 0 else 1.0
