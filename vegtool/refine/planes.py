@@ -53,8 +53,8 @@ LEAST_GAIN = 1e-9
 class PlaneOptions:
     """What planes are chosen by, and for how long.
 
-    compactness: what a squared distance from the cluster's centre costs, if a squared depth off the
-    plane costs 1.
+    compactness: what a squared distance along the plane from its centre costs, if one off the plane
+    costs 1.
     orientation: what a piece seen from the edge costs, if one as far off its plane as it is large,
     or as a pixel where that is larger, costs 1.
     outside: power of the share of a piece that is seen, by which pieces weigh; 0 for all alike.

@@ -5,10 +5,11 @@ What a piece costs on a plane through c with the normal m is, per area,
     depth^2  +  compactness distance^2  +  orientation (1 - (n . m)^2)
 
 depth: of its points off the plane, which is how far they are drawn from where they are; distance:
-from c, which keeps pictures small and full; n: its normal, an oblique piece covering less on the
-plane than it should. The plane that costs a cluster least passes through its mean, and its normal
-is the least eigenvector of a 3 x 3 matrix: k-plane clustering (Bradley, Mangasarian 2000) with the
-orientation of Cohen-Steiner, Alliez, Desbrun: Variational shape approximation (2004).
+along the plane from c, which keeps pictures small and full; n: its normal, an oblique piece
+covering less on the plane than it should. The plane that costs a cluster least passes through its
+mean, and its normal is the least eigenvector of a 3 x 3 matrix: k-plane clustering (Bradley,
+Mangasarian 2000) with the orientation of Cohen-Steiner, Alliez, Desbrun: Variational shape
+approximation (2004).
 """
 
 from __future__ import annotations

@@ -18,6 +18,8 @@ DIRECTIONS = 24
 """From both ends of each."""
 COLUMN = 3.0
 """Side of a column, in sizes of a piece."""
+MOST_COLUMNS = 1 << 31
+"""Of a row."""
 POINTS = np.array([[4, 1, 1], [1, 4, 1], [1, 1, 4], [2, 2, 2]]) / 6
 """Barycentric, where a face's texture is looked at."""
 
@@ -37,15 +39,17 @@ def seen(pieces: Pieces, surface: float, size: float, opacity: float) -> FloatAr
         depth = opacity * surface * pieces.weight * turned / (COLUMN * size) ** 2
         across = np.cross(direction, np.eye(3)[np.abs(direction).argmin()])
         sides = unit(np.stack([across, np.cross(direction, across)]))
-        cell = np.floor(pieces.middle @ sides.T / (COLUMN * size)).astype(np.int64)
-        column = np.unique(cell, axis=0, return_inverse=True)[1].ravel()
+        x, y = np.floor(sides @ pieces.middle.T / (COLUMN * size) + 0.5).astype(np.int64)
+        column = x * MOST_COLUMNS + y
         order = np.lexsort((pieces.middle @ direction, column))
-        through = np.cumsum(depth[order]) - depth[order]
-        behind = np.empty(len(pieces))
-        behind[order] = through
-        whole = np.bincount(column, depth)
-        behind -= (np.cumsum(whole) - whole)[column]
-        before = whole[column] - behind - depth
+        through = np.cumsum(depth[order])
+        first = np.flatnonzero(np.diff(column[order], prepend=column[order[0]] - 1))
+        length = np.diff(first, append=len(order))
+        start = np.repeat(through[first] - depth[order[first]], length)
+        end = np.repeat(through[first + length - 1], length)
+        before, behind = np.empty(len(pieces)), np.empty(len(pieces))
+        behind[order] = through - depth[order] - start
+        before[order] = end - through
         total += turned * (np.exp(-np.maximum(before, 0)) + np.exp(-np.maximum(behind, 0))) / 2
         shown += turned
     return np.divide(total, shown, out=np.ones_like(total), where=shown > 0)
