@@ -15,6 +15,7 @@ from time import perf_counter
 from typing import Any
 
 from judge.photographs import FOV_DEG, SIZE
+from vegtool.convert import LEVEL_RATIO
 from vegtool.formats.manifest import read_manifest
 from vegtool.lod import Display
 from vegtool.plant import Plant
@@ -25,7 +26,7 @@ SHARES = (10, 20, 40)
 """At most such a part of the original's triangles is shown at each distance."""
 LEAST = 256
 """Triangles: to fewer no level is forced."""
-MOST_BILLBOARDS = 1024
+MOST_BILLBOARDS = 2048
 """Of the first level: in a picture of 256 pixels, more would be smaller than leaves."""
 ATTEMPTS = 4
 PLAIN = "--refine none"
@@ -88,7 +89,8 @@ def within(model: Path, folder: Path, options: str, plant: Plant) -> Chain:
     --pixels and --billboards are left as they are where they stand among the options.
     """
     allowed = limits(len(plant.faces))
-    billboards = min(allowed[0] // 2, MOST_BILLBOARDS)
+    each = [most // 2 * LEVEL_RATIO**i for i, most in enumerate(allowed)]
+    billboards = min(*each, MOST_BILLBOARDS)
     # a little larger: distances are rounded up
     near = Display(FOV_DEG, SIZE).pixels_per_metre(DISTANCES[0] * plant.radius)
     pixels = "" if "--pixels" in options else f"--pixels {1.02 * near * plant.extent:.4g}"
@@ -100,7 +102,7 @@ def within(model: Path, folder: Path, options: str, plant: Plant) -> Chain:
         shares = [
             most / level["triangles"]
             for level, most in zip(shown, allowed, strict=True)
-            if level["kind"] != "mesh"
+            if level in chain.levels  # and not the original
         ]
         room = min(shares, default=1.0)
         if chosen or room >= 1:
