@@ -85,7 +85,8 @@ class Atlas:
 
     color: (h, w, 4) uint8, sRGB, straight alpha: coverage, fitted in each picture so that as much
     of it passes a test at 128 as is covered; colour dilated under alpha 0.
-    normal: (h, w, 3) uint8, tangent space of the billboard (x along u, y along v, blue > 0.5).
+    normal: (h, w, 3) uint8, tangent space of the billboard (x along u, y along v); blue is above
+    one half but where the source's own shading normals point away from the side that is seen.
     depth: (h, w) uint16, signed depth along the side's own normal over the billboard's half_depth:
     32768 is the plane, 65535 half_depth towards the viewer, 1 half_depth behind, 0 nothing.
     front, back: (p, 4) int32 texels x0, y0, width, height (y down from the top row), gutter not

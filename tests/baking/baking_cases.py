@@ -146,8 +146,7 @@ def picture(plant: Plant, faces, board: Billboards, index: int, size, samples: i
                     continue
                 n = frame @ (weight @ plant.normals[plant.faces[f]]) * [1, 1, side]
                 n = n / np.linalg.norm(n) * (1 if facing else -1)
-                n[2] = max(n[2], 0)
-                best = (z * side, texel[:3], n / np.linalg.norm(n), z)
+                best = (z * side, texel[:3], n, z)
             if best is not None:
                 texel = j // samples, i // samples
                 color[texel] += best[1]

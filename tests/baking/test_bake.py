@@ -176,15 +176,16 @@ def test_a_leaf_whose_normal_leans_needs_a_picture_of_its_own_behind():
     assert (atlas.front == atlas.back).all()
 
 
-def test_normals_are_turned_to_the_viewer_and_stay_in_the_upper_half():
-    """Seen from behind, glTF reverses the normal; one that then points away goes to the horizon."""
+def test_normals_are_unit_vectors_wherever_they_point():
+    """Seen from behind, glTF reverses the normal; one that then points away stays so, as it would
+    in a client: of random ones half do."""
     rng = np.random.default_rng(0)
     plant = leafy(rng, 60)
     tilted = rng.normal(size=(180, 3))
     plant = replace(plant, normals=tilted / np.linalg.norm(tilted, axis=1, keepdims=True))
     baked = bake(plant, np.zeros(60, np.int32), billboards([[0, 0, 0]], 1.3, 1.3), 16.0)
-    assert (baked.atlas.normal[..., 2] >= 128).all()
     unit = baked.atlas.normal[baked.atlas.color[..., 3] > 0] / 127.5 - 1
+    assert 0.3 < (unit[:, 2] < 0).mean() < 0.7
     assert np.abs(np.linalg.norm(unit, axis=1) - 1).max() < 0.02
 
 

@@ -20,8 +20,8 @@ void main() {
     vec3 normal = v_normal;
 #endif
     if (!gl_FrontFacing) normal = -normal;  // glTF: a back face's normal is reversed
-    // Shading normals may still point away. The horizon is the nearest that a normal map can say.
-    normal.z = max(normal.z, 0.0);
+    // Shading normals may still point away, those of a crown do on half of its leaves. Blue is
+    // below one half there: what glTF advises against, clients show, and light is wrong without.
     if (dot(normal, normal) < 1e-6) normal = vec3(0.0, 0.0, 1.0);
     normal = normalize(normal);
     out_color = vec4(sqrt(color), 1.0);

@@ -33,8 +33,8 @@ void main() {
     out_depth = 0.0;
     if (covered > 0.0) {
         out_color = vec4(srgb_from_linear(color / covered), covered / float(samples * samples));
-        vec3 n = normalize(normal);
-        n.z = max(n.z, 0.01);  // blue above one half, as glTF asks
+        // opposite normals may leave nothing
+        vec3 n = length(normal) > 1e-3 * covered ? normalize(normal) : vec3(0.0, 0.0, 1.0);
         out_normal.xyz = floor(n * 127.5 + 128.001) / 255.0;
         float signed_depth = (1.0 - 2.0 * depth / covered) / 0.999;
         out_depth = (floor(clamp(signed_depth, -1.0, 1.0) * 32767.0 + 0.5) + 32768.0) / 65535.0;
