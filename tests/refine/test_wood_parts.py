@@ -10,7 +10,7 @@ from refine.wood_cases import all_of, straight, tree, tube, wood
 
 from vegtool.arrays import FloatArray
 from vegtool.plant import Material, Plant, Texture
-from vegtool.refine.wood_choice import Screen
+from vegtool.refine.wood_choice import THICKEST, Screen
 from vegtool.refine.wood_color import face_colors
 from vegtool.refine.wood_lumps import Surface, lumps
 from vegtool.refine.wood_seen import opacity, seen_through
@@ -96,9 +96,12 @@ def test_a_price_takes_no_more_than_it_is_worth() -> None:
 def test_stems_in_place_of_others_show_their_surface() -> None:
     found = stems(tree(200))
     screen = Screen.of(found, 0.5)
-    for price in (0.01, 1.0, 100.0):
+    for price in (0.01, 0.3, 1.0):
         choice = screen.choice(price)
         assert (choice.wider @ screen.covered) == pytest.approx(screen.covered.sum())
+    few = screen.choice(1000.0)  # but none becomes a club
+    assert (few.wider * screen.thick <= np.maximum(screen.thick, THICKEST) + 1e-9).all()
+    assert (few.wider > 0).sum() == 1
 
 
 def root_flare() -> Plant:

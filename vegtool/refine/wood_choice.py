@@ -48,6 +48,9 @@ DISPLACED = 2.0
 TIP = 0.5
 """Of the girth at the last ring but one: a stem whose end is thinner, or thinner than a pixel, ends
 in a point."""
+THICKEST = 1.0
+"""Pixels: stems that stand for others are made no thicker than this, if they are not themselves.
+Surface that is lost so is worth less than the sight of a club."""
 HIDDEN = 0.05
 """The least that a stem counts which nobody sees."""
 
@@ -185,7 +188,8 @@ class Screen:
 
     def _grouped(self, free: Bools, price: float) -> FloatArray:
         """(t,) how many times its own surface each of the free stems shows: neighbours that are
-        together worth no more than a triangle are shown by the largest of them."""
+        together worth no more than a triangle are shown by the largest of them, as far as
+        THICKEST allows."""
         order = self._side_by_side
         seen = self.counts * self.covered
         small = order[(free & (seen < price))[order]]
@@ -196,7 +200,9 @@ class Screen:
             last = np.cumsum(np.bincount(group)) - 1
             largest = small[np.lexsort((self.covered[small], group))[last]]
             wider[small] = 0.0
-            wider[largest] = np.bincount(group, self.covered[small]) / self.covered[largest]
+            together = np.bincount(group, self.covered[small]) / self.covered[largest]
+            widest = np.maximum(1.0, THICKEST / np.maximum(self.thick[largest], 1e-9))
+            wider[largest] = np.minimum(together, widest)
         return wider
 
     @cached_property
