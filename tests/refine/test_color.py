@@ -12,6 +12,7 @@ from vegtool.growth import sample
 from vegtool.lod import Atlas, Level
 from vegtool.measure.scores import Truths, scores, truths
 from vegtool.measure.views import views
+from vegtool.plant import Material
 from vegtool.refine.color import Shares, factor_table, gains, scaled, shares, unbiased_color
 
 pytestmark = pytest.mark.gl
@@ -101,5 +102,17 @@ def test_billboards_alone_and_nothing_at_all(tree: tuple[Level, Truths]) -> None
     atlas: Atlas = replace(alone.atlas, color=np.zeros_like(alone.atlas.color))
     empty = replace(alone, atlas=atlas)
     assert unbiased_color(empty, truth).atlas is not None
-    with pytest.raises(ValueError, match="billboards"):
-        scaled(Level("mesh", mesh=truth.plant), 1.0, 1.0)
+
+
+def test_a_mesh_alone_is_scaled_by_its_vertices(tree: tuple[Level, Truths]) -> None:
+    """The plant itself, in one colour that is too dark."""
+    _, truth = tree
+    colors = np.tile([0.02, 0.03, 0.01, 1.0], (len(truth.plant.positions), 1))
+    plain = Material("plain", double_sided=True)
+    face_material = np.zeros(len(truth.plant.faces), np.int32)
+    mesh = replace(truth.plant, materials=(plain,), face_material=face_material, branches=None)
+    level = Level("mesh", mesh=replace(mesh, colors=colors))
+    for _ in range(3):  # each may double it
+        level = unbiased_color(level, truth)
+    assert abs(bias(level, truth)) < 0.005
+    assert unbiased_color(Level("mesh", mesh=mesh), truth).mesh is mesh

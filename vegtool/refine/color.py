@@ -36,11 +36,11 @@ class Shares:
 
 
 def unbiased_color(level: Level, truths: Truths) -> Level:
-    """The level with the colours of its atlas and of its mesh scaled, by a factor each.
+    """The level with the colours of its atlas and of its mesh's vertices scaled, by a factor each.
 
     What is compared is the mean linear luminance of what is covered, over all views and distances
-    of the truths, drawn as by a client without anisotropic filtering. Raises ValueError for a level
-    without billboards, CapabilityError where OpenGL cannot draw.
+    of the truths, drawn as by a client without anisotropic filtering. A mesh without colours of its
+    own stays as it is. Raises CapabilityError where OpenGL cannot draw.
     """
     return scaled(level, *gains(shares(level, truths)))
 
@@ -57,6 +57,8 @@ def shares(level: Level, truths: Truths) -> Shares:
     total = float((whole[known] / true[known]).mean())
     if level.mesh is None:
         return Shares(total, 0.0)
+    if level.atlas is None:
+        return Shares(0.0, total)
     part = luminances(drawn(scaled(level, 1.0, 0.0), cameras, lights))
     billboards = float((part[known] / true[known]).mean())
     return Shares(billboards, max(total - billboards, 0.0))
@@ -75,19 +77,18 @@ def gains(shown: Shares) -> tuple[float, float]:
 
 def scaled(level: Level, billboards: float, mesh: float) -> Level:
     """The level with linear colours times these factors; no channel gets brighter than 1."""
-    if level.atlas is None:
-        raise ValueError("unbiased_color: needs a level with billboards")
-    color = level.atlas.color.copy()
-    color[..., :3] = factor_table(billboards)[color[..., :3]]
-    if level.atlas.white is not None:
-        x, y, w, h = level.atlas.white.tolist()
-        color[y : y + h, x : x + w] = 255
-    level = replace(level, atlas=replace(level.atlas, color=color))
-    if level.mesh is None or level.mesh.colors is None:
-        return level
-    factors = level.mesh.colors.copy()
-    factors[:, :3] = np.clip(factors[:, :3] * mesh, 0.0, 1.0)
-    return replace(level, mesh=replace(level.mesh, colors=factors))
+    if level.atlas is not None:
+        color = level.atlas.color.copy()
+        color[..., :3] = factor_table(billboards)[color[..., :3]]
+        if level.atlas.white is not None:
+            x, y, w, h = level.atlas.white.tolist()
+            color[y : y + h, x : x + w] = 255
+        level = replace(level, atlas=replace(level.atlas, color=color))
+    if level.mesh is not None and level.mesh.colors is not None:
+        colors = level.mesh.colors.copy()
+        colors[:, :3] = np.clip(colors[:, :3] * mesh, 0.0, 1.0)
+        level = replace(level, mesh=replace(level.mesh, colors=colors))
+    return level
 
 
 def factor_table(factor: float) -> ByteArray:
