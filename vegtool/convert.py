@@ -204,13 +204,14 @@ def level_maker(buffers: PlantBuffers, truth_at: TruthsAt, options: ConvertOptio
     """
     if options.refine == "none":
         return partial(billboard_level, buffers, options)
-    from vegtool.refine.level import refined_level, source_of
+    from vegtool.refine.level import Wanted, refined_level, source_of
 
     source = source_of(buffers, truth_at)
 
     def make(count: int, near_m: float, progress: Progress) -> Level:
         most = TRIANGLES_PER_BILLBOARD * count
-        return refined_level(source, most, near_m, options.max_texture, options.seed, progress)
+        wanted = Wanted(most, near_m, options.max_texture, options.seed)
+        return refined_level(source, wanted, progress)
 
     return make
 

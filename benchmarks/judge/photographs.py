@@ -2,7 +2,8 @@
 
 The canvas as it comes: the material that its loader makes, mip-maps by plain averaging, no
 anisotropy, alpha tested once per pixel, 4x multisampling averaged in sRGB. Packages and browser as
-for tests/clients. A truth is drawn at TRUTH x TRUTH samples per pixel and averaged here.
+for tests/clients. A truth is drawn at TRUTH x TRUTH samples per pixel, without mip-maps, and
+averaged here.
 """
 
 from __future__ import annotations
@@ -59,6 +60,7 @@ HELD_OUT = views(0.4, OTHER_SUNS)
 class Shot:
     """A file seen from all views at one distance (bounding radii) from a centre (metres).
 
+    mipmaps: as a client has them; without, textures are sampled as they are.
     keep: whether the photographs are worth keeping in the cache.
     """
 
@@ -68,6 +70,7 @@ class Shot:
     distance: float
     views: tuple[View, ...] = STANDARD
     supersample: int = 1
+    mipmaps: bool = True
     keep: bool = False
 
 
@@ -148,6 +151,7 @@ def _job(shot: Shot, folder: Path) -> dict[str, Any]:
         "center": shot.center,
         "radius": shot.radius,
         "supersample": shot.supersample,
+        "mipmaps": shot.mipmaps,
         "views": [{**asdict(view), "distance": shot.distance} for view in shot.views],
         "out": [str(folder / f"{i}.png") for i in range(len(shot.views))],
     }

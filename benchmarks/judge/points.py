@@ -66,10 +66,16 @@ def over(points: Sequence[Point], what: str) -> list[float]:
 
 
 def points_of(
-    name: str, model: Path, options: str, sets: Sequence[str], folder: Path, cache: Path | None
+    name: str,
+    model: Path,
+    options: str,
+    sets: Sequence[str],
+    folder: Path,
+    cache: Path | None,
+    stock_truth: bool = False,
 ) -> Iterator[Point]:
     """All of one plant; as for `sit`."""
-    sitting = sit(model, options, sets, folder, cache)
+    sitting = sit(model, options, sets, folder, cache, stock_truth)
     most = limits(len(sitting.plant.faces))
     levels = [sitting.chain.file(level) for level in sitting.shown]
     for views in sets:

@@ -53,11 +53,17 @@ class Sitting:
 
 
 def sit(
-    model: Path, options: str, sets: Sequence[str], folder: Path, cache: Path | None = None
+    model: Path,
+    options: str,
+    sets: Sequence[str],
+    folder: Path,
+    cache: Path | None = None,
+    stock_truth: bool = False,
 ) -> Sitting:
     """Convert a plant and photograph all of it, from the sets of VIEWS that are named.
 
     folder: of this plant alone. cache: keeps the photographs of originals from run to run.
+    stock_truth: draw the truth with mip-maps too.
     """
     plant = read_plant(model)
     folder.mkdir()
@@ -80,6 +86,7 @@ def sit(
             distance,
             VIEWS[views],
             TRUTH if drawn == Sitting.TRUTH else 1,
+            mipmaps=drawn != Sitting.TRUTH or stock_truth,
             keep=files[drawn][i] == original,
         )
         for views in sets

@@ -18,14 +18,14 @@ NEAREST = 8
 def geometric_error(
     plant: Plant,
     labels: IntArray,
-    billboards: Billboards,
+    billboards: Billboards | None,
     mesh: Plant | None = None,
     by_mesh: npt.NDArray[np.bool_] | None = None,
 ) -> tuple[float, float]:
     """Greatest and 95th percentile distance, metres, from surface points to where they are drawn.
 
-    labels: (f,) the cluster of each face; -1 for faces that no billboard shows. mesh: of a hybrid
-    level; by_mesh: (f,) bool, the faces that it shows. What shows a point counts: its plane, of
+    labels: (f,) the cluster of each face; -1 for faces that no billboard shows. billboards: None for
+    a level of mesh alone. mesh: of a mixed level; by_mesh: (f,) bool, the faces that it shows. What shows a point counts: its plane, of
     crossed planes the nearest one, or the nearest place of the mesh. Points are spread evenly over
     the area, the same ones at every call; what nothing shows is left out. Raises ValueError where a
     cluster that has faces has no billboard, and where nothing is shown.
@@ -33,7 +33,7 @@ def geometric_error(
     face, points = surface_samples(plant, SAMPLES)
     distance = np.full(len(points), np.inf)
     planar = labels[face] >= 0
-    if planar.any():
+    if planar.any() and billboards is not None:
         distance[planar] = _to_planes(points[planar], labels[face[planar]], billboards)
     if mesh is not None and by_mesh is not None:
         shown = by_mesh[face]

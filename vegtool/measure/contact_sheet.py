@@ -83,15 +83,17 @@ def _magnified(picture: ByteArray) -> ByteArray:
 
 
 def _caption(level: Level, number: int) -> list[tuple[str, tuple[int, int, int]]]:
-    assert level.billboards is not None and level.atlas is not None
-    height, width = level.atlas.color.shape[:2]
-    triangles = f"{level.triangles:,} triangles"
-    if level.mesh_triangles:
-        triangles += f" ({level.mesh_triangles:,} of a mesh)"
+    shown, atlas = f"{level.triangles:,} triangles", "no textures"
+    if level.billboards is not None and level.atlas is not None:
+        height, width = level.atlas.color.shape[:2]
+        shown = f"{len(level.billboards):,} billboards, {shown}"
+        if level.mesh_triangles:
+            shown += f" ({level.mesh_triangles:,} of a mesh)"
+        atlas = f"atlas {width} x {height}"
     lines = [
         (f"LOD{number}, from {level.near_distance_m:.3g} m", INK),
-        (f"{len(level.billboards):,} billboards, {triangles}", FAINT),
-        (f"atlas {width} x {height}", FAINT),
+        (shown, FAINT),
+        (atlas, FAINT),
     ]
     if level.measured is not None:
         error, live = level.measured.errors["flip"].mean, level.measured.live["flip"].mean

@@ -2,14 +2,18 @@
 
 The operations are in files of their own; here is their order. Wood is drawn as geometry (wood.py),
 leaves on the planes that displace and flatten them least (planes.py). Alpha is solved until as much
-is covered as should be (coverage.py), colour until what is covered is as bright (color.py).
+is covered as should be (coverage.py), colour until what is covered is as bright (color.py). Where
+leaves are only a few pixels large, opaque triangles may show them better than pictures do
+(foliage.py): then both are drawn, and the one that errs less is the level.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from vegtool.arrays import IntArray
 from vegtool.baking.bake import bake
@@ -17,118 +21,176 @@ from vegtool.baking.options import BakeOptions
 from vegtool.boxes import geometric_error
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Level
-from vegtool.measure.scores import TruthsAt
-from vegtool.plant import Material, Plant
+from vegtool.measure.scores import TruthsAt, scores
+from vegtool.plant import Plant
 from vegtool.progress import Progress, silent
+from vegtool.refine.color import unbiased_color
 from vegtool.refine.coverage import pictures, unbiased_alpha, with_alpha
+from vegtool.refine.foliage import Leaves, leaves_of, reduced_leaves
+from vegtool.refine.mesh import joined
 from vegtool.refine.planes import planes
-from vegtool.refine.wood import Wood, reduced_wood
+from vegtool.refine.wood import Wood, reduced_wood, wood_triangles
 from vegtool.refine.wood_stems import Stems, stems_of
 from vegtool.timing import timed
 
-WOOD_SHARE = 0.25
-"""Of a level's triangles, at most."""
 REACH = 2.0
 """A level is made for distances up to so many times its nearest: there the next one begins."""
+SMALL = 6.0
+"""Pixels: side of a square as large as what one triangle of leaves covers, up to which triangles
+are tried. Farther than twice that they never erred less than pictures."""
 
 
 @dataclass(frozen=True, eq=False)
 class Source:
     """What all levels of a plant are made from.
 
-    buffers: the plant's, without mipmaps. truth_at: what it looks like. by_mesh: (f,) bool, the
-    faces that a mesh shows, as `stems`; None where there are none.
+    buffers: the plant's, without mipmaps. truth_at: what it looks like. wood, leaf: (k,) int32, the
+    faces of either role; wood alone counts as leaves, since nothing else shows it.
     """
 
     buffers: PlantBuffers
     truth_at: TruthsAt
-    by_mesh: np.ndarray
-    stems: Stems | None
+    wood: IntArray
+    leaf: IntArray
 
     @property
     def plant(self) -> Plant:
         return self.buffers.plant
 
+    @cached_property
+    def stems(self) -> Stems | None:
+        """The wood as stems; None where there is none."""
+        return stems_of(self.plant, self.wood) if len(self.wood) else None
+
+    @cached_property
+    def leaves(self) -> Leaves | None:
+        """The leaves as what they cover; None where there are none."""
+        return leaves_of(self.plant, self.leaf) if len(self.leaf) else None
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A level to be: at most so many triangles, for distances from `near_m` metres on, and textures
+    of at most `max_texture` texels a side."""
+
+    triangles: int
+    near_m: float
+    max_texture: int = BakeOptions().max_texture
+    seed: int = 0
+
 
 def source_of(buffers: PlantBuffers, truth_at: TruthsAt) -> Source:
     """What is known of a plant before its first level."""
     plant = buffers.plant
-    wood = np.array([m.role == "wood" for m in plant.materials])[plant.face_material]
-    stems = None if wood.all() else stems_of(plant, np.flatnonzero(wood).astype(np.int32))
-    return Source(buffers, truth_at, wood & (stems is not None), stems)
+    wood = np.array([m.role == "wood" for m in plant.materials], dtype=bool)[plant.face_material]
+    if wood.all():
+        wood = ~wood
+    faces = np.arange(len(plant.faces), dtype=np.int32)
+    return Source(buffers, truth_at, faces[wood], faces[~wood])
 
 
-def refined_level(
-    source: Source,
-    triangles: int,
-    near_m: float,
-    max_texture: int = BakeOptions().max_texture,
-    seed: int = 0,
-    progress: Progress = silent,
-) -> Level:
-    """A level of at most that many triangles, for distances from `near_m` metres on.
+def refined_level(source: Source, wanted: Wanted, progress: Progress = silent) -> Level:
+    """A level of a plant; its atlas, if it has one, has a texel to the pixel at `near_m`.
 
-    Its atlas has one texel per pixel there. Raises UsageError where pictures do not fit into
-    `max_texture` texels, CapabilityError where nothing can draw.
+    Raises UsageError where pictures do not fit into `max_texture` texels, CapabilityError where
+    nothing can draw.
     """
-    plant, display = source.plant, source.truth_at.display
-    density = display.pixels_per_metre(near_m)
     seconds: dict[str, float] = {}
+    pixel_m = 1 / source.truth_at.display.pixels_per_metre(wanted.near_m)
+    progress("wood", 0.0)
     with timed(seconds, "wood"):
-        wood = None
-        if source.stems is not None:
-            wood = reduced_wood(source.stems, max(int(WOOD_SHARE * triangles), 1), 1 / density)
-    drawn_as_mesh = source.by_mesh & (wood is not None)
-    progress("planes", 0.0)
+        wood = wood_of(source, wanted, pixel_m)
+    left = wanted.triangles - (0 if wood is None else len(wood.faces))
+    progress("planes", 0.1)
+    level = on_planes(source, wanted, wood, left, seconds, progress)
+    if leaf_pixels(source, left, pixel_m) <= SMALL:
+        progress("foliage", 0.8)
+        with timed(seconds, "foliage"):
+            level = better(source, wanted, level, as_triangles(source, wanted, wood, left))
+    return replace(level, near_distance_m=wanted.near_m, seconds={**seconds, **level.seconds})
+
+
+def wood_of(source: Source, wanted: Wanted, pixel_m: float) -> Wood | None:
+    """The wood that a level shows as a mesh."""
+    if source.stems is None:
+        return None
+    count = wood_triangles(source.stems, wanted.triangles, pixel_m)
+    return reduced_wood(source.stems, count, pixel_m)
+
+
+def on_planes(
+    source: Source,
+    wanted: Wanted,
+    wood: Wood | None,
+    triangles: int,
+    seconds: dict[str, float],
+    progress: Progress,
+) -> Level:
+    """Wood as it is given, the rest on billboards of so many triangles."""
+    plant = source.plant
+    density = source.truth_at.display.pixels_per_metre(wanted.near_m)
+    by_mesh: npt.NDArray[np.bool_] = np.zeros(len(plant.faces), dtype=bool)
+    by_mesh[source.wood] = wood is not None
     with timed(seconds, "planes"):
-        left = triangles - (0 if wood is None else len(wood.faces))
-        shown = np.flatnonzero(~drawn_as_mesh).astype(np.int32)
-        labels, billboards = planes(plant, shown, max(left // 2, 1), 1 / density, seed=seed)
-        labels = np.where(drawn_as_mesh, -1, labels).astype(np.int32)
-    how = BakeOptions(max_texture=max_texture, fit_alpha=False)
+        shown = np.flatnonzero(~by_mesh).astype(np.int32)
+        count = max(triangles // 2, 1)
+        labels, billboards = planes(plant, shown, count, 1 / density, seed=wanted.seed)
+        labels = np.where(by_mesh, -1, labels).astype(np.int32)
+    how = BakeOptions(max_texture=wanted.max_texture, fit_alpha=False)
     level = bake(
         source.buffers,
         labels,
         billboards,
         density,
         how,
-        lambda stage, fraction: progress(stage, 0.3 + 0.4 * fraction),
+        lambda stage, fraction: progress(stage, 0.3 + 0.3 * fraction),
         white=wood is not None,
     )
-    mesh = None
-    if wood is not None:
-        mesh = mesh_of(wood)
+    mesh = joined([wood], "wood")
+    if mesh is not None:
         level = replace(level, kind="hybrid", mesh=mesh)
+    progress("coverage", 0.6)
     with timed(seconds, "coverage"):
-        level = covering(level, near_m, how.gutter)
+        level = covering(level, how.gutter)
+    progress("color", 0.7)
+    with timed(seconds, "color"):
+        level = unbiased_color(level, source.truth_at(wanted.near_m))
     with timed(seconds, "error"):
-        error = geometric_error(plant, labels, level.billboards, mesh, drawn_as_mesh)
-    return replace(
-        level,
-        near_distance_m=near_m,
-        geometric_error_m=error,
-        seconds={**seconds, **level.seconds},
-    )
+        error = geometric_error(plant, labels, billboards, mesh, by_mesh)
+    return replace(level, geometric_error_m=error)
 
 
-def covering(level: Level, near_m: float, gutter: int) -> Level:
+def covering(level: Level, gutter: int) -> Level:
     """The level with alpha of which as much passes as is covered."""
     assert level.atlas is not None
-    atlas = level.atlas
-    alpha = atlas.color[..., 3]
-    return with_alpha(level, unbiased_alpha(alpha, pictures(atlas), gutter, reach=REACH))
+    alpha = level.atlas.color[..., 3]
+    return with_alpha(level, unbiased_alpha(alpha, pictures(level.atlas), gutter, reach=REACH))
 
 
-def mesh_of(wood: Wood) -> Plant:
-    """Wood as the mesh of a hybrid level."""
-    count = len(wood.positions)
-    return Plant(
-        "wood",
-        wood.positions,
-        wood.normals,
-        np.zeros((count, 2)),
-        wood.faces,
-        np.zeros(len(wood.faces), np.int32),
-        (Material("wood", double_sided=True),),
-        colors=np.concatenate([wood.colors, np.ones((count, 1))], axis=1),
-    )
+def leaf_pixels(source: Source, triangles: int, pixel_m: float) -> float:
+    """Side, in pixels, of a square as large as what each of so many triangles of leaves covers."""
+    leaves = source.leaves
+    if leaves is None or triangles < 1:
+        return np.inf
+    covered = float(leaves.area.sum()) * leaves.radius**2
+    return float(np.sqrt(covered / triangles)) / pixel_m
+
+
+def as_triangles(source: Source, wanted: Wanted, wood: Wood | None, triangles: int) -> Level:
+    """Wood as it is given, leaves as so many triangles."""
+    assert source.leaves is not None
+    pixel_m = 1 / source.truth_at.display.pixels_per_metre(wanted.near_m)
+    leaves = reduced_leaves(source.leaves, triangles, pixel_m, seed=wanted.seed)
+    mesh = joined([wood, leaves], source.plant.name)
+    assert mesh is not None
+    none = np.full(len(source.plant.faces), -1, dtype=np.int32)
+    error = geometric_error(source.plant, none, None, mesh, none < 0)
+    level = Level("mesh", mesh=mesh, geometric_error_m=error)
+    return unbiased_color(level, source.truth_at(wanted.near_m))
+
+
+def better(source: Source, wanted: Wanted, one: Level, other: Level) -> Level:
+    """Of two levels that which errs less (FLIP) at the nearest distance; the first of equals."""
+    truth = source.truth_at(wanted.near_m)
+    errs = [float(scores(truth, level).values["flip"].mean()) for level in (one, other)]
+    return other if errs[1] < errs[0] else one
