@@ -19,7 +19,7 @@ client will ever sample can be ranked as it would be, and a histogram gives ever
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -29,7 +29,10 @@ from scipy.ndimage import distance_transform_edt
 
 from vegtool.arrays import ByteArray, FloatArray, IntArray, SingleArray
 from vegtool.baking.coverage import owners
+from vegtool.gl.draw import Light
 from vegtool.lod import Atlas, Level
+from vegtool.measure.scores import Truths
+from vegtool.refine.drawn import drawn
 
 PASS = 127.5
 """Alpha of 255 at the client's cutoff."""
@@ -49,10 +52,39 @@ MOST_SAMPLES = 4
 """Per axis and texel."""
 LEAST_SHARE = 1e-3
 """Mips that are sampled less do not count."""
+LEAST_LEVELS = 8.0
+"""Of alpha, below the cutoff: fewer would not tell apart how near texels are to a shape."""
 LEAST_SPAN = 1e-3
 """Of a threshold's weight: keeps the slope finite where a picture has one rank only."""
+ROUNDS = 3
+"""In which a level's coverage is measured."""
+ENOUGH = 0.005
+"""Of bias, either way: less does not show."""
+FACTORS = (0.25, 4.0)
+"""Of what pictures cover: farther off, it is not their alpha that is wrong."""
+POWER, POWERS = 0.8, (0.3, 1.5)
+"""Coverage on the screen grows as that power of what pictures cover: leaves hide leaves."""
+NOTHING = 1e-3
+"""Of the truth's coverage, or of a factor."""
+LOST = 0.05
+"""Share of its coverage that a level may lose before it has been used too far."""
+FARTHEST_SEEN = 16.0
+"""Times the near end: coverage is followed no farther."""
 ANGLES, TURNS, DISTANCES = 64, 8, 9
 """Samples of the directions and distances from which a billboard is seen."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """A level whose coverage has been measured.
+
+    factor: by how much the coverage of its pictures was scaled. bias: of the level's coverage, as a
+    share of the truth's.
+    """
+
+    level: Level
+    factor: float
+    bias: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +100,19 @@ class Ranks:
     grown: IntArray
     covered: FloatArray
     area: FloatArray
+
+    def target(self, factor: npt.ArrayLike) -> FloatArray:
+        """(p,) texels that are to pass: what is covered times a factor, (p,) or one for all."""
+        return np.asarray(np.minimum(self.covered * np.asarray(factor, np.float64), self.area))
+
+
+@dataclass(frozen=True, eq=False)
+class Passing:
+    """texels: (p, b) how many of each picture a client shows, expected over all directions and
+    distances, if those pass whose rank is `low` + b or more."""
+
+    texels: FloatArray
+    low: float
 
 
 def unbiased_alpha(
@@ -87,9 +132,86 @@ def unbiased_alpha(
     that are all empty or all covered stay as they are, and so does what lies outside them.
     """
     ranks = ranked(alpha, rects, gutter)
-    target = np.minimum(ranks.covered * np.asarray(factor, dtype=np.float64), ranks.area)
-    threshold = thresholds(ranks, target, seen_at(density, reach))
-    return mapped(alpha, ranks, threshold)
+    passing = expected(ranks, seen_at(density, reach))
+    return mapped(alpha, ranks, thresholds(passing, ranks.target(factor)))
+
+
+def solve_coverage(
+    level: Level,
+    truths: Sequence[Truths],
+    gutter: int,
+    density: float = 1.0,
+    reach: float = 2.0,
+) -> Solved:
+    """The level with unbiased alpha, whose targets are scaled until it covers what the truth does.
+
+    level: with an atlas whose alpha is the mean coverage of each texel (`fit_alpha=False`). truths:
+    what is compared, drawn as by a client without anisotropic filtering, over all of their views
+    and distances. gutter, density, reach: as in `unbiased_alpha`. At most ROUNDS are drawn, and the
+    best of them is kept; where the truth covers nothing, nothing is scaled. Raises ValueError for a
+    level without an atlas, CapabilityError where OpenGL cannot draw.
+    """
+    if level.atlas is None:
+        raise ValueError("solve_coverage: needs a level with an atlas")
+    alpha, rects = level.atlas.color[..., 3], pictures(level.atlas)
+    ranks = ranked(alpha, rects, gutter)
+    passing = expected(ranks, seen_at(density, reach))
+    factor, tried = 1.0, list[Solved]()
+    for _ in range(ROUNDS):
+        made = with_alpha(level, mapped(alpha, ranks, thresholds(passing, ranks.target(factor))))
+        bias = measured_bias(made, truths)
+        tried.append(Solved(made, factor, bias or 0.0))
+        if bias is None or abs(bias) <= ENOUGH:
+            break
+        factor = next_factor(tried)
+    return min(tried, key=lambda solved: abs(solved.bias))
+
+
+def measured_bias(level: Level, truths: Sequence[Truths]) -> float | None:
+    """How much more than the truth a level covers, as a share of that: mean over views and
+    distances. None where the truth covers nothing."""
+    cameras = [camera for t in truths for row in t.cameras for camera in row]
+    lights = [Light(direction=view.sun) for t in truths for _ in t.cameras for view in t.views]
+    true = np.array([r.covered for t in truths for row in t.references for r in row])
+    if not (true > 0).any():
+        return None
+    shown = np.array([p[..., 3].sum(dtype=np.float64) for p in drawn(level, cameras, lights)])
+    return float((shown[true > 0] / true[true > 0]).mean()) - 1
+
+
+def next_factor(tried: Sequence[Solved]) -> float:
+    """By how much to scale next: coverage grows as a power of the factor, that of the last two."""
+    last = tried[-1]
+    power = POWER
+    if len(tried) > 1:
+        before = tried[-2]
+        step = np.log(last.factor / before.factor)
+        grown = np.log(max(1 + last.bias, NOTHING) / max(1 + before.bias, NOTHING))
+        power = float(np.clip(grown / step, *POWERS)) if abs(step) > NOTHING else POWER
+    wanted = last.factor * max(1 + last.bias, NOTHING) ** (-1 / power)
+    return float(np.clip(wanted, *FACTORS))
+
+
+def kept_until(level: Level, density: float = 1.0) -> float:
+    """How many times farther than its near end a level's pictures may be seen until they are
+    expected to show LOST less than there; at most FARTHEST_SEEN.
+
+    level: with its final alpha. density: texels per pixel at the near end, seen from in front.
+    """
+    atlas = level.atlas
+    if atlas is None:
+        return FARTHEST_SEEN
+    image = atlas.color[..., 3].astype(np.float32)
+    owner = owners(image.shape, pictures(atlas))
+    shown = np.array(
+        [
+            float(np.count_nonzero(values >= PASS))
+            for _, values, _ in sampled(image, owner, np.ones(len(MIPS)))
+        ]
+    )
+    away = np.geomspace(1.0, FARTHEST_SEEN, 1 + 12 * int(np.log2(FARTHEST_SEEN)))
+    kept = np.array([seen_at(density * d, 1.0) @ shown for d in away])
+    return float(away[np.argmin(np.append(kept >= (1 - LOST) * kept[0], False)) - 1])
 
 
 def with_alpha(level: Level, alpha: ByteArray) -> Level:
@@ -170,22 +292,25 @@ def seen_at(density: float, reach: float) -> FloatArray:
     return np.asarray(share / share.sum())
 
 
-def thresholds(ranks: Ranks, target: FloatArray, seen: FloatArray) -> FloatArray:
-    """(p,) the rank from which on as many texels pass as `target`, (p,), says, as nearly as can be.
-
-    seen: (m,) shares of MIPS.
-    """
-    count = len(target)
+def expected(ranks: Ranks, seen: FloatArray) -> Passing:
+    """What passes at any threshold. seen: (m,) shares of MIPS."""
+    count = len(ranks.area)
     low, high = rank_of(ranks.weight.min(initial=1.0)), rank_of(ranks.weight.max(initial=1.0))
     bins = int(np.ceil(high - low)) + 2
     found = np.zeros((count, bins))
     for owner, weight, share in sampled(ranks.weight, ranks.owner, seen):
         place = owner * bins + (rank_of(weight) - (low - 0.5)).astype(np.int64)
         found += share * np.bincount(place, minlength=count * bins).reshape(count, bins)
-    total = np.maximum(found.sum(axis=1, keepdims=True), np.finfo(float).tiny)
-    passing = np.cumsum(found[:, ::-1], axis=1)[:, ::-1] / total * ranks.area[:, None]
-    best = np.abs(passing - target[:, None]).argmin(axis=1)
-    return np.asarray(best + low - 0.5, dtype=np.float64)
+    share_of = found / np.maximum(found.sum(axis=1, keepdims=True), np.finfo(float).tiny)
+    texels = np.cumsum(share_of[:, ::-1], axis=1)[:, ::-1] * ranks.area[:, None]
+    return Passing(texels, float(low) - 0.5)
+
+
+def thresholds(passing: Passing, target: FloatArray) -> FloatArray:
+    """(p,) the rank from which on as many texels pass as `target`, (p,), says, as nearly as can
+    be."""
+    best = np.abs(passing.texels - target[:, None]).argmin(axis=1)
+    return np.asarray(best + passing.low, dtype=np.float64)
 
 
 def sampled(
@@ -235,7 +360,8 @@ def interpolated(values: SingleArray, y: FloatArray, x: FloatArray) -> SingleArr
 
 
 def mapped(alpha: ByteArray, ranks: Ranks, threshold: FloatArray) -> ByteArray:
-    """Alpha linear in weight, PASS at the threshold, as steep as 0 to 255 allow in each picture."""
+    """Alpha linear in weight, PASS at the threshold, as steep as 0 to 255 allow in each picture, or
+    steeper where too little of that were left below."""
     inside = ranks.owner >= 0
     owner, weight = ranks.owner[inside], ranks.weight[inside].astype(np.float64)
     low, high = np.full(len(threshold), np.inf), np.zeros(len(threshold))
@@ -244,7 +370,8 @@ def mapped(alpha: ByteArray, ranks: Ranks, threshold: FloatArray) -> ByteArray:
     middle = weight_of(threshold)
     span = np.maximum(np.maximum(middle - low, high - middle), LEAST_SPAN * middle)
     some = (ranks.covered > 0) & (ranks.covered < ranks.area)
-    slope = np.where(some, PASS / span, 0.0)
+    steps = np.maximum(PASS / span, LEAST_LEVELS / np.maximum(middle - low, LEAST_SPAN * middle))
+    slope = np.where(some, steps, 0.0)
     grown = ranks.grown
     value = PASS + slope[grown] * (ranks.weight - middle[grown])
     fitted = np.clip(np.round(value), 0, 255).astype(np.uint8)
