@@ -63,7 +63,7 @@ class PlaneOptions:
     """
 
     compactness: float = 0.01
-    orientation: float = 1.0
+    orientation: float = 0.5
     outside: float = 1.5
     rounds: int = 16
     settled: float = 1e-3
