@@ -390,6 +390,11 @@ def test_of_a_stack_of_leaves_the_outer_ones_are_seen() -> None:
     assert (np.diff(share)[:4] < 0).all() and (np.diff(share)[4:] > 0).all()
 
 
+def test_hidden_leaves_have_a_plane_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "seen", lambda pieces, *_: np.zeros(len(pieces)))
+    assert len(checked(plant_of(foliage(10)), 9)) == 9
+
+
 @pytest.mark.models
 def test_an_ash_costs_less_than_by_kmeans(models: Path) -> None:
     plant = read_plant(next((models / "eztree_ash_small").rglob("*.glb")))

@@ -45,6 +45,8 @@ MERGED = 8
 """Of a round, one in so many clusters at most."""
 NEAR = 64
 """Clusters, the nearest to its own, that a piece may move to."""
+LEAST_SEEN = 1e-3
+"""Of a piece: what seems hidden is to lie somewhere too."""
 LEAST_GAIN = 1e-9
 """Of what a piece costs: it stays where it is unless it saves more."""
 
@@ -105,7 +107,7 @@ def planes(
     pixel = pixel_m / shown.radius if shown.radius else 0.0
     weights = Weights(options.compactness, options.orientation * (size**2 + pixel**2))
     if options.outside:
-        share = seen(pieces, surface, size, opacity(shown))
+        share = np.maximum(seen(pieces, surface, size, opacity(shown)), LEAST_SEEN)
         pieces = replace(pieces, weight=pieces.weight * share**options.outside)
     start = np.arange(len(pieces))
     if len(pieces) > max(MOST_PIECES, count):
