@@ -79,12 +79,13 @@ class Solved:
     """A level whose coverage has been measured.
 
     factor: by how much the coverage of its pictures was scaled. bias: of the level's coverage, as a
-    share of the truth's.
+    share of the truth's. rounds: how often it was drawn.
     """
 
     level: Level
     factor: float
     bias: float
+    rounds: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,11 +161,12 @@ def solve_coverage(
     for _ in range(ROUNDS):
         made = with_alpha(level, mapped(alpha, ranks, thresholds(passing, ranks.target(factor))))
         bias = measured_bias(made, truths)
-        tried.append(Solved(made, factor, bias or 0.0))
+        tried.append(Solved(made, factor, bias or 0.0, len(tried) + 1))
         if bias is None or abs(bias) <= ENOUGH:
             break
         factor = next_factor(tried)
-    return min(tried, key=lambda solved: abs(solved.bias))
+    best = min(tried, key=lambda solved: abs(solved.bias))
+    return replace(best, rounds=len(tried))
 
 
 def measured_bias(level: Level, truths: Sequence[Truths]) -> float | None:
