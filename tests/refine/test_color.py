@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from hybrids import hybrid_of
 
+from vegtool.baking.bake import bake
 from vegtool.growth import sample
-from vegtool.lod import Atlas, Level
+from vegtool.lod import Atlas, Billboards, Level
 from vegtool.measure.scores import Truths, scores, truths
 from vegtool.measure.views import views
-from vegtool.plant import Material
+from vegtool.plant import Material, Plant
 from vegtool.refine.color import Shares, factor_table, gains, scaled, shares, unbiased_color
 
 pytestmark = pytest.mark.gl
@@ -116,3 +117,23 @@ def test_a_mesh_alone_is_scaled_by_its_vertices(tree: tuple[Level, Truths]) -> N
         level = unbiased_color(level, truth)
     assert abs(bias(level, truth)) < 0.005
     assert unbiased_color(Level("mesh", mesh=mesh), truth).mesh is mesh
+
+
+@pytest.mark.parametrize("normal", [(0.6, 0.0, 0.8), (0.6, 0.0, -0.8), (0.0, 0.6, -0.8)])
+def test_a_card_with_a_normal_of_its_own_is_lit_as_it_was(normal: tuple[float, ...]) -> None:
+    """As of a crown: on one side of the card it points away from whoever sees that side."""
+    x, y = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]).T
+    card = Plant(
+        "card",
+        np.stack([x, y, np.zeros(4)], axis=1),
+        np.tile(normal, (4, 1)),
+        np.zeros((4, 2)),
+        np.array([[0, 1, 2], [0, 2, 3]]),
+        np.zeros(2, np.int32),
+        (Material("leaf", double_sided=True, role="leaf"),),
+    )
+    z, side = np.zeros((1, 3)), np.eye(3)[:2]
+    plane = Billboards(z, side[:1], side[1:], np.ones((1, 2)), np.zeros(1), np.zeros(1))
+    level = bake(card, np.zeros(2, np.int32), plane, 16.0)
+    truth = truths(card, views("all", 6), [100.0])
+    assert np.abs(scores(truth, level).values["color_bias"]).max() < 0.02
