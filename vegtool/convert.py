@@ -167,15 +167,16 @@ def convert(
     with PlantBuffers(plant) as buffers:
         truth_at = TruthsAt(plant, views_of(measure), options.display, buffers)
         make = level_maker(buffers, truth_at, options)
+        size = min(max(options.pixels or near_pixels(counts[0]), NEAR_LIMITS[0]), NEAR_LIMITS[1])
+        near = rounded_up(distance_of(plant, options.display, size))
         for index, count in enumerate(counts):
 
             def report(stage: str, fraction: float, index: int = index) -> None:
                 done = making * (index + fraction) / len(counts)
                 progress(f"LOD{index + 1}: {stage}", done)
 
-            size = (options.pixels or near_pixels(counts[0])) / LEVEL_RATIO**index
-            near = rounded_up(distance_of(plant, options.display, max(size, NEAR_LIMITS[0])))
             level = make(count, near, report)
+            near = rounded_up(LEVEL_RATIO * near)
             saves = level.triangles <= MOST_OF_PREVIOUS * levels[-1].triangles
             if saves or (index == len(counts) - 1 and len(levels) == 1):
                 levels.append(level)

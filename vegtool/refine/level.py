@@ -21,11 +21,12 @@ from vegtool.baking.options import BakeOptions
 from vegtool.boxes import geometric_error
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Level
+from vegtool.measure.distances import rounded_up
 from vegtool.measure.scores import TruthsAt, scores
 from vegtool.plant import Plant
 from vegtool.progress import Progress, silent
 from vegtool.refine.color import unbiased_color
-from vegtool.refine.coverage import pictures, unbiased_alpha, with_alpha
+from vegtool.refine.coverage import solve_coverage
 from vegtool.refine.foliage import Leaves, leaves_of, reduced_leaves
 from vegtool.refine.mesh import joined
 from vegtool.refine.planes import planes
@@ -77,6 +78,11 @@ class Wanted:
     near_m: float
     max_texture: int = BakeOptions().max_texture
     seed: int = 0
+
+    @property
+    def far_m(self) -> float:
+        """Metres to which the level is made for."""
+        return rounded_up(REACH * self.near_m)
 
 
 def source_of(buffers: PlantBuffers, truth_at: TruthsAt) -> Source:
@@ -151,20 +157,14 @@ def on_planes(
         level = replace(level, kind="hybrid", mesh=mesh)
     progress("coverage", 0.6)
     with timed(seconds, "coverage"):
-        level = covering(level, how.gutter)
+        truths = [source.truth_at(metres) for metres in (wanted.near_m, wanted.far_m)]
+        level = solve_coverage(level, truths, how.gutter, reach=REACH).level
     progress("color", 0.7)
     with timed(seconds, "color"):
         level = unbiased_color(level, source.truth_at(wanted.near_m))
     with timed(seconds, "error"):
         error = geometric_error(plant, labels, billboards, mesh, by_mesh)
     return replace(level, geometric_error_m=error)
-
-
-def covering(level: Level, gutter: int) -> Level:
-    """The level with alpha of which as much passes as is covered."""
-    assert level.atlas is not None
-    alpha = level.atlas.color[..., 3]
-    return with_alpha(level, unbiased_alpha(alpha, pictures(level.atlas), gutter, reach=REACH))
 
 
 def leaf_pixels(source: Source, triangles: int, pixel_m: float) -> float:
