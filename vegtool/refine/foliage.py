@@ -5,13 +5,13 @@ to lose it in.
     leaves = leaves_of(plant, faces)                     # once for a plant
     foliage = reduced_leaves(leaves, triangles, pixel_m)  # for each level
 
-After Cook, Halstead, Planck, Ryu: Stochastic simplification of aggregate detail (2007): of many
-small elements some are drawn, as much larger. Here leaves are put into as many groups as there are
-triangles, of leaves that are near each other, look one way and have one colour. Of each group one
-leaf, chosen by chance in proportion to what it covers, says how the triangle is turned and where it
-lies; the group says how long and wide it is, its colour and how much it covers. Leaves of a group
-hide each other where its triangle hides nothing of itself, so it covers what they do together, as
-rays from all around find it.
+After Cook, Halstead, Planck, Ryu: Stochastic simplification of aggregate detail (2007), where some
+of many small elements are drawn in place of all, as much larger; here nothing is left to chance.
+Leaves are put into as many groups as there are triangles (foliage_groups.py), mostly of what can be
+seen from outside. A triangle lies in the middle of its group, along the plane that its leaves look
+out of, as long and wide as they spread there, and as large as what they cover together: leaves of a
+group hide each other where a triangle hides nothing of itself, and so do triangles less than the
+leaves. Both are found by rays from all around.
 """
 
 from __future__ import annotations
@@ -27,14 +27,15 @@ from vegtool.plant import Plant
 from vegtool.refine.cutouts import cutouts
 from vegtool.refine.foliage_groups import grouped, mean_of
 from vegtool.refine.hits import Hits, Rays, distinct, hits, nearest
-from vegtool.seeding import generator
 
 Ints = npt.NDArray[np.int64]
 
-UNSEEN = 0.25
+UNSEEN = 0.03
 """What a hidden leaf counts where triangles are dealt out, beside one that is seen."""
-LEANING = 0.5
-"""The least ratio of width to length."""
+SLIMMEST = 0.25
+"""The least ratio of a triangle's width to its length, beside those of an equilateral one."""
+FEW = 16
+"""Rays that the mean of all groups counts as, where it is asked how much one covers."""
 ROUNDS = 3
 """In which the area of all triangles is brought to cover what all leaves do."""
 
@@ -70,15 +71,15 @@ class Foliage:
     """A mesh of leaves, v vertices and t triangles, to be drawn from both sides.
 
     positions: (v, 3) metres. normals: (v, 3) unit. colors: (v, 3) linear. faces: (t, 3) int32.
-    factor: how many times the area of a triangle is that which its leaves cover together, so that
-    all cover what all leaves do.
+    scale: how many times as large a triangle is as what its leaves cover together, for all to
+    cover what all leaves do.
     """
 
     positions: FloatArray
     normals: FloatArray
     colors: FloatArray
     faces: IntArray
-    factor: float
+    scale: float
 
     def __post_init__(self) -> None:
         positions = checked("Foliage.positions", self.positions, (None, 3), np.float64)
@@ -134,8 +135,9 @@ def reduced_leaves(
     """The leaves as at most that many triangles; None for none.
 
     pixel_m: metres that a pixel covers, where the level is seen from nearest. factor: how many
-    times the area that is expected to cover as much as the leaves do. Raises ValueError where
-    either is not positive.
+    times the area that is expected to cover as much as the leaves do, seen from all sides. The
+    triangles suit the leaves, not where they stand. Nothing is random, and the seed changes
+    nothing. Raises ValueError where a length or factor is not positive.
     """
     for name, value in (("pixel_m", pixel_m), ("factor", factor)):
         if not (np.isfinite(value) and value > 0):
@@ -143,19 +145,21 @@ def reduced_leaves(
     if triangles < 1:
         return None
     weight = leaves.area * (UNSEEN + (1 - UNSEEN) * leaves.seen)
-    group = grouped(leaves.middle, leaves.normal, leaves.color, weight, min(triangles, len(leaves)))
-    count = int(group.max()) + 1
-    model = drawn_of(leaves, group, weight, seed)
-    side = sides(leaves.normal, leaves.normal[model], group)
+    count = min(triangles, len(leaves))
+    pixel = pixel_m / leaves.radius
+    group = grouped(leaves.middle, leaves.shading, leaves.color, weight, count, pixel)
+    normal = facing(leaves, group, count)
+    side = np.where((leaves.normal * normal[group]).sum(axis=1) < 0, -1.0, 1.0)
     total = np.bincount(group, leaves.area, count).astype(np.float64)
     area = total * kept(leaves, group, total)
-    axes, ratio = frames(leaves, group, model)
+    middle = mean_of(leaves.middle, leaves.area, group, count)
+    axes, ratio = frames(leaves, group, middle, normal)
     color = mean_of(leaves.color, weight, group, count)
-    shading = mean_of(leaves.shading * side[:, None], weight, group, count)
-    shading = np.where(shading.any(axis=1)[:, None], unit(shading), leaves.normal[model])
+    shading = unit(mean_of(leaves.shading * side[:, None], weight, group, count))
+    shading = np.where(np.any(shading, axis=1, keepdims=True), shading, normal)
 
     def corners(scale: float) -> FloatArray:
-        return triangles_about(leaves.middle[model], axes, ratio, area * scale)
+        return triangles_about(middle, axes, ratio, area * scale)
 
     scale = unbiased(leaves, corners)
     positions = corners(scale * factor) * leaves.radius + leaves.center
@@ -176,21 +180,14 @@ def _seen(found: Hits, count: int) -> FloatArray:
     return np.asarray((free + mean) / (met + 1))
 
 
-def drawn_of(leaves: Leaves, group: Ints, weight: FloatArray, seed: int) -> Ints:
-    """(k,) of each group one leaf, by chance in proportion to its weight."""
-    order = np.argsort(group, kind="stable")
-    first = np.flatnonzero(np.diff(group[order], prepend=-1))
-    end = np.append(first[1:], len(order))
-    reached = np.cumsum(weight[order])
-    before = np.append(0.0, reached)[first]
-    chance = generator(seed, "foliage").random(len(first))
-    at = np.searchsorted(reached, before + chance * (reached[end - 1] - before), side="right")
-    return np.asarray(order[np.clip(at, first, end - 1)])
-
-
-def sides(normal: FloatArray, front: FloatArray, group: Ints) -> FloatArray:
-    """(n,) 1 where a leaf's front is on the side of its group's, (k, 3), and -1 where its back."""
-    return np.where((normal * front[group]).sum(axis=1) < 0, -1.0, 1.0)
+def facing(leaves: Leaves, group: Ints, count: int) -> FloatArray:
+    """(k, 3) unit normals along which most of each group is seen, on the side where most fronts
+    look."""
+    square = leaves.normal[:, :, None] * leaves.normal[:, None]
+    mean = mean_of(square.reshape(-1, 9), leaves.area, group, count).reshape(-1, 3, 3)
+    normal = np.linalg.eigh(mean)[1][:, :, 2]
+    front = mean_of(leaves.normal, leaves.area, group, count)
+    return np.where(((front * normal).sum(axis=1) < 0)[:, None], -normal, normal)
 
 
 def kept(leaves: Leaves, group: Ints, total: FloatArray) -> FloatArray:
@@ -203,52 +200,52 @@ def kept(leaves: Leaves, group: Ints, total: FloatArray) -> FloatArray:
     return np.asarray((once + FEW * mean) / (met + FEW))
 
 
-FEW = 16
-"""Rays as which the mean of all counts."""
+def frames(
+    leaves: Leaves, group: Ints, middle: FloatArray, normal: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """(k, 2, 3) axes across the normals (k, 3), along the most and the least of what each group
+    spreads about its middle (k, 3), and (k,) the ratio of both.
 
-
-def frames(leaves: Leaves, group: Ints, model: Ints) -> tuple[FloatArray, FloatArray]:
-    """(k, 2, 3) axes in the planes of the leaves that are drawn, along the most and the least of
-    what the group is, and (k,) the ratio of both."""
-    normal = leaves.normal[model]
-    count = len(model)
-    spread = leaves.spread[model]
+    The first points to where the group reaches farther, as a triangle does with its tip.
+    """
+    count = len(middle)
+    off = leaves.middle - middle[group]
+    moment = (leaves.spread + off[:, :, None] * off[:, None]).reshape(-1, 9)
+    spread = mean_of(moment, leaves.area, group, count).reshape(-1, 3, 3)
     u = unit(np.cross(normal, np.eye(3)[np.abs(normal).argmin(axis=1)]))
-    v = np.cross(normal, u)
-    uv = np.stack([u, v], axis=1)
-    flat = np.einsum("kai,kij,kbj->kab", uv, spread, uv)
-    values, vectors = np.linalg.eigh(flat)
-    axes = np.einsum("kab,kai->kbi", vectors[:, :, ::-1], uv)
-    axes[:, 1] = np.cross(normal, axes[:, 0])
-    values = np.maximum(values, 0.0)
-    ratio = np.sqrt(values[:, 0] / np.maximum(values[:, 1], np.finfo(float).tiny))
-    assert len(axes) == count
-    return axes, np.maximum(ratio, LEANING)
+    uv = np.stack([u, np.cross(normal, u)], axis=1)
+    values, vectors = np.linalg.eigh(np.einsum("kai,kij,kbj->kab", uv, spread, uv))
+    values = np.maximum(values, np.finfo(float).tiny)
+    along = np.einsum("ka,kai->ki", vectors[:, :, 1], uv)
+    far = np.bincount(group, leaves.area * (off * along[group]).sum(axis=1) ** 3, count)
+    along = np.where((far < 0)[:, None], -along, along)
+    axes = np.stack([along, np.cross(normal, along)], axis=1)
+    return axes, np.maximum(np.sqrt(values[:, 0] / values[:, 1]), SLIMMEST)
 
 
 def triangles_about(
     middle: FloatArray, axes: FloatArray, ratio: FloatArray, area: FloatArray
 ) -> FloatArray:
-    """(k, 3, 3) corners of triangles with those centroids, of that area, as much wider across as
-    `ratio` says beside an equilateral one."""
+    """(k, 3, 3) corners, counter-clockwise from where the first axis crosses to the second, of
+    isosceles triangles with those centroids and areas, their tips along the first; in an
+    equilateral one the ratio is 1."""
     turn = np.arange(3) * 2 * np.pi / 3
     reach = np.sqrt(4 * area / (3 * np.sqrt(3)))
-    along = reach / np.sqrt(ratio)
-    across = reach * np.sqrt(ratio)
-    offset = (
-        np.cos(turn)[:, None] * (along[:, None] * axes[:, 0])[:, None]
-        + np.sin(turn)[:, None] * (across[:, None] * axes[:, 1])[:, None]
-    )
-    return np.asarray(middle[:, None] + offset)
+    sizes = reach[:, None] * np.stack([1 / np.sqrt(ratio), np.sqrt(ratio)], axis=1)
+    around = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    return np.asarray(middle[:, None] + np.einsum("ca,ka,kai->kci", around, sizes, axes))
 
 
 def unbiased(leaves: Leaves, corners: Callable[[float], FloatArray]) -> float:
-    """The scale of areas with which triangles cover as much as the leaves, seen from all sides."""
-    truth = len(np.unique(leaves.found.ray))
+    """The scale of areas at which triangles cover as much as the leaves, seen from all sides.
+
+    corners: of the triangles, (k, 3, 3), at a scale.
+    """
+    wanted = len(np.unique(leaves.found.ray))
     scale = 1.0
     for _ in range(ROUNDS):
-        covers = len(np.unique(hits(leaves.rays, corners(scale)).ray))
-        if not covers:
+        found = len(np.unique(hits(leaves.rays, corners(scale)).ray))
+        if not found:
             return 1.0
-        scale *= truth / covers
+        scale *= wanted / found
     return scale
