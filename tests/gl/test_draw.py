@@ -105,6 +105,20 @@ def test_a_driver_without_half_float_targets_is_named(tree, monkeypatch):
         picture_of(tree, camera_of(tree))
 
 
+def test_a_normal_without_direction_is_lit_by_the_sky_alone():
+    """Halfway between opposite normals there is none, of vertices or of a normal texture."""
+    white = Material("white", base_color=[1.0, 1, 1, 1], double_sided=True)
+    corners = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    faces = [[0, 1, 2], [0, 2, 3]]
+    plate = Plant("plate", corners, np.zeros((4, 3)), np.zeros((4, 2)), faces, [0, 0], (white,))
+    with PlantBuffers(plate) as buffers:
+        light = Light(sun=1.0, sky_above=0.5, sky_below=0.25)
+        picture = draw(buffers, shot_of(camera_of(buffers)), light)
+    color = picture[..., :3][picture[..., 3] == 1]
+    assert color.size
+    np.testing.assert_allclose(color, (0.5 + 0.25) / 2, atol=1e-3)
+
+
 def test_fragments_are_counted_whatever_hides_or_cuts_out(tree):
     """Two squares of 32 x 32 pixels, one behind the other, cut out everywhere; half seen, one."""
     leaf = Material("leaf", base_color=[1, 1, 1, 0.0], alpha_mode="mask", double_sided=True)

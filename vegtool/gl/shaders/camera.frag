@@ -14,7 +14,7 @@ out vec4 fragment;
 
 void main() {
     vec3 color = surface_color(uv, vertex_color);
-    vec3 n = normalize(normal);
+    vec3 n = unit(normal);
 #ifdef NORMAL_MAP
     n = mapped_normal(n, position, uv);
 #endif

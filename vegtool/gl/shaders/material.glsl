@@ -18,6 +18,11 @@ vec3 surface_color(vec2 uv, vec4 vertex_color) {
     return color.rgb;
 }
 
+// What is halfway between opposite normals has no direction, and stays 0.
+vec3 unit(vec3 v) {
+    return v / max(length(v), 1e-12);
+}
+
 #ifdef NORMAL_MAP
 uniform sampler2D normal_map;
 uniform float normal_scale;
@@ -35,7 +40,6 @@ vec3 mapped_normal(vec3 normal, vec3 position, vec2 uv) {
     vec3 bitangent = along_v - normal * dot(normal, along_v);
     vec3 texel = filtered(normal_map, uv).xyz * 2.0 - 1.0;
     texel.xy *= normal_scale;
-    return normalize(normalize(tangent) * texel.x + normalize(bitangent) * texel.y
-                     + normal * texel.z);
+    return unit(unit(tangent) * texel.x + unit(bitangent) * texel.y + normal * texel.z);
 }
 #endif

@@ -15,7 +15,7 @@ layout(location = 1) out vec4 out_normal;
 void main() {
     vec3 color = surface_color(v_uv, v_color);
 #ifdef NORMAL_MAP
-    vec3 normal = mapped_normal(normalize(v_normal), v_position * vec3(1.0, 1.0, side), v_uv);
+    vec3 normal = mapped_normal(unit(v_normal), v_position * vec3(1.0, 1.0, side), v_uv);
 #else
     vec3 normal = v_normal;
 #endif
@@ -23,7 +23,7 @@ void main() {
     // Shading normals may still point away, those of a crown do on half of its leaves. Blue is
     // below one half there: what glTF advises against, clients show, and light is wrong without.
     if (dot(normal, normal) < 1e-6) normal = vec3(0.0, 0.0, 1.0);
-    normal = normalize(normal);
+    normal = unit(normal);
     out_color = vec4(sqrt(color), 1.0);
     out_normal = vec4((normal * 511.0 + 512.0) / 1023.0, 1.0);
 }
