@@ -264,7 +264,7 @@ def _despite(
 def _notes(levels: Sequence[Level], starts: Sequence[float | LeftOut]) -> list[str]:
     """A sentence on each level that was left out."""
     return [
-        f"left out the level of {len(level.billboards or ())} billboards: {start.value}"
+        f"left out the level of {level.triangles:,} triangles: {start.value}"
         for level, start in zip(levels, starts, strict=True)
         if isinstance(start, LeftOut)
     ]
