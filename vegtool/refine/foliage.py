@@ -35,7 +35,10 @@ UNSEEN = 0.03
 SLIMMEST = 0.25
 """The least ratio of a triangle's width to its length, beside those of an equilateral one."""
 FEW = 16
-"""Rays that the mean of all groups counts as, where it is asked how much one covers."""
+"""Rays for which the mean of all groups counts where one is asked how much it covers, and no
+change where all are: as good as none where many meet, and the answer where none does."""
+LEAST = 1e-15
+"""Squared radii: faces that cover no more are none."""
 ROUNDS = 3
 """In which the area of all triangles is brought to cover what all leaves do."""
 
@@ -96,12 +99,14 @@ class Foliage:
 
 def leaves_of(plant: Plant, faces: IntArray) -> Leaves | None:
     """The leaves among a plant's faces, (k,) indices; None where they cover nothing."""
+    if not len(faces):
+        return None
     cut = cutouts(plant, faces)
     corners = plant.corners[faces]
-    low, high = corners.min(axis=(0, 1), initial=np.inf), corners.max(axis=(0, 1), initial=-np.inf)
+    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
     center, radius = (low + high) / 2, float(np.linalg.norm(high - low) / 2)
     covered = plant.face_areas[faces] * cut.share
-    own = np.flatnonzero(covered > 0)
+    own = np.flatnonzero(covered > LEAST * radius**2)
     if not len(own):
         return None
     corners = (corners[own] - center) / radius
@@ -196,7 +201,7 @@ def kept(leaves: Leaves, group: Ints, total: FloatArray) -> FloatArray:
     found, count = leaves.found, len(total)
     met = np.bincount(group[found.face], minlength=count)
     once = distinct(found.ray, group[found.face], count)
-    mean = once.sum() / max(met.sum(), 1)
+    mean = once.sum() / met.sum() if met.any() else 1.0
     return np.asarray((once + FEW * mean) / (met + FEW))
 
 
@@ -245,7 +250,5 @@ def unbiased(leaves: Leaves, corners: Callable[[float], FloatArray]) -> float:
     scale = 1.0
     for _ in range(ROUNDS):
         found = len(np.unique(hits(leaves.rays, corners(scale)).ray))
-        if not found:
-            return 1.0
-        scale *= wanted / found
+        scale *= (wanted + FEW) / (found + FEW)
     return scale

@@ -23,11 +23,16 @@ TURNS = 2
 """Steps towards the direction of greatest spread, from the axis with the greatest one."""
 
 
+def sums_of(values: FloatArray, weight: FloatArray, group: Ints, count: int) -> FloatArray:
+    """(count, d) weighted sums of values (n, d)."""
+    columns = [np.bincount(group, weight * column, count) for column in values.T]
+    return np.stack(columns, axis=1).astype(np.float64, copy=False)
+
+
 def mean_of(values: FloatArray, weight: FloatArray, group: Ints, count: int) -> FloatArray:
     """(count, d) weighted means of values (n, d); 0 for groups without any."""
     total = np.bincount(group, weight, count)
-    sums = np.stack([np.bincount(group, weight * column, count) for column in values.T], axis=1)
-    return np.asarray(sums / np.where(total > 0, total, 1.0)[:, None])
+    return sums_of(values, weight, group, count) / np.where(total > 0, total, 1.0)[:, None]
 
 
 def grouped(
@@ -71,7 +76,8 @@ def halved(
     first = np.cumsum(size) - size
     reached = np.cumsum(mass)
     before = np.append(0.0, reached)[first]
-    share = (reached - mass / 2 - before[of]) / (reached[first + size - 1] - before)[of]
+    total = np.bincount(group, weight, count)
+    share = (reached - mass / 2 - before[of]) / total[of]
     low, nth = wanted // 2, np.arange(len(of)) - first[of]
     # neither half gets fewer leaves than groups are wanted of it
     fits = (nth >= low[of]) & (share >= (low / wanted)[of])
@@ -90,6 +96,6 @@ def widest(away: FloatArray, weight: FloatArray, group: Ints, count: int) -> Flo
     direction = np.eye(away.shape[1])[axis]
     for _ in range(TURNS):
         pull = weight * (away * direction[group]).sum(axis=1)
-        sums = np.stack([np.bincount(group, pull * column, count) for column in away.T], axis=1)
-        direction = np.where(sums.any(axis=1)[:, None], unit(sums), direction)
-    return direction
+        sums = sums_of(away, pull, group, count)
+        direction = np.where(np.any(sums, axis=1, keepdims=True), unit(sums), direction)
+    return np.asarray(direction)
