@@ -20,8 +20,9 @@ from vegtool.formats.manifest import read_manifest
 from vegtool.growth import sample
 
 pytestmark = pytest.mark.gl
-SMALL = ["--billboards", "24", "--levels", "2", "--measure", "off"]
+SMALL = ["--billboards", "24", "--levels", "2", "--refine", "none", "--measure", "off"]
 MEASURED = [*SMALL[:-1], "quick"]
+REFINED = ["--billboards", "24", "--levels", "2"]
 
 
 @pytest.fixture(scope="module")
@@ -36,9 +37,12 @@ def contents(folder: Path) -> dict[str, str]:
     return {p.name: sha256(p.read_bytes()).hexdigest() for p in sorted(folder.iterdir())}
 
 
-def test_convert_writes_levels_combined_manifest_and_sheet(model: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("how", [SMALL, REFINED], ids=["plain", "refined"])
+def test_convert_writes_levels_combined_manifest_and_sheet(
+    how: list[str], model: Path, tmp_path: Path
+) -> None:
     out = tmp_path / "out"
-    assert run(["convert", str(model), "-o", str(out), *SMALL]) == 0
+    assert run(["convert", str(model), "-o", str(out), *how, "--measure", "off"]) == 0
     assert set(contents(out)) == {
         "bush_LOD1.glb", "bush_LOD2.glb", "bush.glb", "bush.lod.json", "bush.png",
     }  # fmt: skip
@@ -61,7 +65,7 @@ def test_json_names_the_files(
     assert run(["convert", str(model), "-o", str(tmp_path / "o"), "--json", *SMALL]) == 0
     (outcome,) = json.loads(capsys.readouterr().out)
     assert all(Path(f).is_file() for f in outcome["files"])
-    assert [row["kind"] for row in outcome["levels"]] == ["mesh", "hybrid", "hybrid"]
+    assert [row["kind"] for row in outcome["levels"]] == ["mesh", "billboards", "billboards"]
 
 
 def test_the_result_states_distances_and_errors(
@@ -123,14 +127,17 @@ def test_a_gl_that_cannot_multisample_is_exit_5(
     assert not (tmp_path / "o").exists()
 
 
-def test_same_input_same_bytes_whatever_the_number_of_jobs(model: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("how", [MEASURED, REFINED], ids=["plain", "refined"])
+def test_same_input_same_bytes_whatever_the_number_of_jobs(
+    how: list[str], model: Path, tmp_path: Path
+) -> None:
     folder = tmp_path / "in"
     folder.mkdir()
     for name in ("a", "b"):
         (folder / f"{name}.glb").write_bytes(model.read_bytes())
     one, two = tmp_path / "one", tmp_path / "two"
-    assert run(["convert", str(folder), "-o", str(one), "-j", "1", *MEASURED]) == 0
-    assert run(["convert", str(folder), "-o", str(two), "-j", "2", *MEASURED]) == 0
+    assert run(["convert", str(folder), "-o", str(one), "-j", "1", *how]) == 0
+    assert run(["convert", str(folder), "-o", str(two), "-j", "2", *how]) == 0
     assert contents(one) == contents(two)
 
 
@@ -378,7 +385,8 @@ def test_what_lies_beside_another_input_is_never_overwritten(model: Path, tmp_pa
 def test_verbose_says_where_the_time_went(
     model: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    arguments = ["convert", str(model), "--dry-run", *SMALL, "-o", str(tmp_path)]
+    arguments = ["convert", str(model), "--dry-run", "--levels", "1", "-o", str(tmp_path)]
+    arguments += ["--measure", "off", "--billboards", "24"]
     assert run(arguments) == 0
     assert " s, " not in capsys.readouterr().err
     for refine, stages in (("full", ("wood", "planes")), ("none", ("clustering", "boxes"))):
