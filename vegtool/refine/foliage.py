@@ -26,13 +26,13 @@ from vegtool.arrays import FloatArray, IntArray, checked, unit
 from vegtool.plant import Plant
 from vegtool.refine.cutouts import cutouts
 from vegtool.refine.foliage_groups import grouped, mean_of
-from vegtool.refine.hits import Hits, Rays, distinct, hits, nearest
+from vegtool.refine.hits import Hits, Rays, distinct, hits, nearest, rays_met
 
 Ints = npt.NDArray[np.int64]
 
 UNSEEN = 0.03
 """What a hidden leaf counts where triangles are dealt out, beside one that is seen."""
-SLIMMEST = 0.25
+SLIMMEST = 0.12
 """The least ratio of a triangle's width to its length, beside those of an equilateral one."""
 FEW = 16
 """Rays for which the mean of all groups counts where one is asked how much it covers, and no
@@ -246,9 +246,9 @@ def unbiased(leaves: Leaves, corners: Callable[[float], FloatArray]) -> float:
 
     corners: of the triangles, (k, 3, 3), at a scale.
     """
-    wanted = len(np.unique(leaves.found.ray))
+    wanted = rays_met(leaves.rays, leaves.found)
     scale = 1.0
     for _ in range(ROUNDS):
-        found = len(np.unique(hits(leaves.rays, corners(scale)).ray))
+        found = rays_met(leaves.rays, hits(leaves.rays, corners(scale)))
         scale *= (wanted + FEW) / (found + FEW)
     return scale

@@ -23,16 +23,11 @@ TURNS = 2
 """Steps towards the direction of greatest spread, from the axis with the greatest one."""
 
 
-def sums_of(values: FloatArray, weight: FloatArray, group: Ints, count: int) -> FloatArray:
-    """(count, d) weighted sums of values (n, d)."""
-    columns = [np.bincount(group, weight * column, count) for column in values.T]
-    return np.stack(columns, axis=1).astype(np.float64, copy=False)
-
-
 def mean_of(values: FloatArray, weight: FloatArray, group: Ints, count: int) -> FloatArray:
     """(count, d) weighted means of values (n, d); 0 for groups without any."""
     total = np.bincount(group, weight, count)
-    return sums_of(values, weight, group, count) / np.where(total > 0, total, 1.0)[:, None]
+    columns = [np.bincount(group, weight * column, count) for column in values.T]
+    return np.stack(columns, axis=1) / np.where(total > 0, total, 1.0)[:, None]
 
 
 def grouped(
@@ -54,48 +49,52 @@ def grouped(
     both = np.sqrt(2)  # a scalar product of tensors counts what is off the diagonal twice
     looks = np.stack([x * x, y * y, z * z, both * x * y, both * x * z, both * y * z], axis=1)
     features = np.concatenate([middle, ORIENTATION * size * looks, COLOR * size * color], axis=1)
-    group, wanted = np.zeros(len(weight), dtype=np.int64), np.array([count])
+    order = np.arange(len(weight))
+    first, wanted = np.array([0]), np.array([count])
     while (wanted > 1).any():
-        group, wanted = halved(features, weight, group, wanted)
+        moved, first, wanted = halved(features, weight, first, wanted)
+        order, features, weight = order[moved], features[moved], weight[moved]
+    group = np.empty(len(order), dtype=np.int64)
+    group[order] = np.repeat(np.arange(count), np.diff(first, append=len(order)))
     return group
 
 
 def halved(
-    features: FloatArray, weight: FloatArray, group: Ints, wanted: Ints
-) -> tuple[Ints, Ints]:
-    """Groups (n,) in two where several are wanted, and how many each half is to become.
+    features: FloatArray, weight: FloatArray, first: Ints, wanted: Ints
+) -> tuple[Ints, Ints, Ints]:
+    """Groups in two where several are wanted: the order (n,) in which halves lie one after the
+    other, as groups do now, where each begins, and how many it is to become.
 
-    wanted: (k,) how many each group is to become, no more than it has leaves.
+    first: (k,) where groups begin. wanted: (k,) how many each is to become, no more than it has
+    leaves.
     """
-    count = len(wanted)
-    away = features - mean_of(features, weight, group, count)[group]
-    along = (away * widest(away, weight, group, count)[group]).sum(axis=1)
+    size = np.diff(first, append=len(weight))
+    group = np.repeat(np.arange(len(first)), size)
+    total = np.add.reduceat(weight, first)
+    mean = np.add.reduceat(weight[:, None] * features, first) / total[:, None]
+    away = features - mean[group]
+    along = np.einsum("nd,nd->n", away, widest(away, weight, first, group)[group])
     order = np.lexsort((along, group))
-    of, mass = group[order], weight[order]
-    size = np.bincount(of, minlength=count)
-    first = np.cumsum(size) - size
+    mass = weight[order]
     reached = np.cumsum(mass)
     before = np.append(0.0, reached)[first]
-    total = np.bincount(group, weight, count)
-    share = (reached - mass / 2 - before[of]) / total[of]
-    low, nth = wanted // 2, np.arange(len(of)) - first[of]
+    share = (reached - mass / 2 - before[group]) / total[group]
+    low, nth = wanted // 2, np.arange(len(group)) - first[group]
     # neither half gets fewer leaves than groups are wanted of it
-    fits = (nth >= low[of]) & (share >= (low / wanted)[of])
-    upper = (wanted > 1)[of] & (fits | (nth >= (size - wanted + low)[of]))
-    parts = np.where(wanted > 1, 2, 1)
-    result = np.empty_like(group)
-    result[order] = (np.cumsum(parts) - parts)[of] + upper
+    lower = (share < (low / wanted)[group]) & (nth < (size - wanted + low)[group])
+    cut = np.where(wanted > 1, np.maximum(np.add.reduceat(lower, first, dtype=np.int64), low), 0)
+    begin = np.stack([first, first + cut], axis=1)
     halves = np.stack([low, wanted - low], axis=1)
-    return result, halves[halves > 0]
+    return order, begin[halves > 0], halves[halves > 0]
 
 
-def widest(away: FloatArray, weight: FloatArray, group: Ints, count: int) -> FloatArray:
-    """(count, d) about the unit direction in which what is away from its group's mean, (n, d),
-    spreads most: TURNS steps of power iteration."""
-    axis = mean_of(away**2, weight, group, count).argmax(axis=1)
+def widest(away: FloatArray, weight: FloatArray, first: Ints, group: Ints) -> FloatArray:
+    """(k, d) about the unit direction in which what is away from its group's mean, (n, d), spreads
+    most: TURNS steps of power iteration."""
+    axis = np.add.reduceat(weight[:, None] * away**2, first).argmax(axis=1)
     direction = np.eye(away.shape[1])[axis]
     for _ in range(TURNS):
-        pull = weight * (away * direction[group]).sum(axis=1)
-        sums = sums_of(away, pull, group, count)
+        pull = weight * np.einsum("nd,nd->n", away, direction[group])
+        sums = np.add.reduceat(pull[:, None] * away, first)
         direction = np.where(np.any(sums, axis=1, keepdims=True), unit(sums), direction)
-    return np.asarray(direction)
+    return direction

@@ -105,6 +105,13 @@ def _of_view(rays: Rays, corners: FloatArray, index: int) -> Hits:
     return Hits(ray, face, np.stack([second, third], axis=1), depth, twice[face] > 0)
 
 
+def rays_met(rays: Rays, found: Hits) -> int:
+    """How many rays meet anything."""
+    met = np.zeros(len(rays.views) * rays.cells**2, dtype=bool)
+    met[found.ray] = True
+    return int(np.count_nonzero(met))
+
+
 def distinct(ray: Ints, label: Ints, count: int) -> FloatArray:
     """(count,) rays that meet each label at least once: rays and labels (h,) of hits."""
     key = np.unique(ray * count + label)
