@@ -70,6 +70,15 @@ def test_the_row_is_what_measuring_by_hand_gives(
     assert row.distance_m == tuple(bench.truths.distance_m)
 
 
+def test_refined_rows_keep_to_their_budgets(made: dict[str, tuple[Row, Any]]) -> None:
+    """In triangles, two for each billboard; and what they are made by takes its time."""
+    for budget in (4, 30):
+        row, _ = made[f"refined {budget}"]
+        assert (row.family, row.budget) == ("refined", budget)
+        assert 0 < row.cost.triangles <= 2 * budget
+        assert {"plant", "planes"} <= set(row.cost.seconds)
+
+
 def test_bounds_are_of_billboards_and_fall_with_distance(made: dict[str, tuple[Row, Any]]) -> None:
     """The farther the smaller; e_p is never more than what bounds it."""
     row, _ = made["kmeans 30"]
