@@ -65,7 +65,7 @@ class PlaneOptions:
     """
 
     compactness: float = 0.01
-    orientation: float = 0.3
+    orientation: float = 0.1
     outside: float = 1.5
     rounds: int = 16
     settled: float = 1e-3
