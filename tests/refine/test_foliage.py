@@ -12,7 +12,7 @@ from vegtool.arrays import FloatArray
 from vegtool.plant import Material, Plant, Texture
 from vegtool.refine.cutouts import cutouts
 from vegtool.refine.foliage import Foliage, leaves_of, reduced_leaves
-from vegtool.refine.foliage_groups import grouped
+from vegtool.refine.foliage_groups import grouped, mean_of, refilled, settled, split
 from vegtool.refine.hits import Rays, distinct, hits, nearest
 from vegtool.refine.mesh import joined
 
@@ -134,14 +134,37 @@ def group(middle: FloatArray, looks: FloatArray, weight: FloatArray, count: int)
     return grouped(middle, looks, np.ones((len(middle), 3)), weight, count, PIXEL)
 
 
-def test_groups_are_as_many_as_wanted_and_alike_in_weight() -> None:
+def test_halves_are_as_many_as_wanted_and_alike_in_weight() -> None:
     random = np.random.default_rng(1)
-    middle, weight = random.normal(size=(4096, 3)), random.random(4096) + 0.5
-    looks = np.tile([0.0, 1, 0], (4096, 1))
+    features, weight = random.normal(size=(4096, 3)), random.random(4096) + 0.5
     for count in (1, 7, 64):
-        total = np.bincount(group(middle, looks, weight, count), weight)
+        total = np.bincount(split(features, weight, count), weight)
         assert len(total) == count
         np.testing.assert_allclose(total, weight.sum() / count, rtol=0.25)
+
+
+def test_settled_groups_are_as_many_and_nearer_together() -> None:
+    random = np.random.default_rng(1)
+    features, weight = random.normal(size=(2000, 3)), random.random(2000)
+
+    def spread(labels: np.ndarray) -> float:
+        away = features - mean_of(features, weight, labels, 50)[labels]
+        return float(weight @ (away**2).sum(axis=1))
+
+    halves = split(features, weight, 50)
+    found = settled(features, weight, halves, 50)
+    assert len(np.unique(found)) == 50
+    assert spread(found) < 0.95 * spread(halves)
+
+
+def test_groups_that_are_lost_are_made_up_for_where_leaves_spread_most() -> None:
+    features = np.array([[0.0], [0.1], [5], [9], [20], [20]])
+    weight = np.ones(6)
+    labels = refilled(features, weight, np.array([0, 0, 1, 1, 2, 2]), 4)
+    assert len(np.unique(labels)) == 4
+    assert labels[2] != labels[3] and labels[0] == labels[1]
+    both = refilled(features, weight, np.array([0, 0, 0, 0, 1, 1]), 6)
+    assert len(np.unique(both)) == 4  # one turn halves each group once
 
 
 def test_every_group_has_a_leaf_whatever_they_weigh() -> None:

@@ -153,6 +153,7 @@ def reduced_leaves(
     count = min(triangles, len(leaves))
     pixel = pixel_m / leaves.radius
     group = grouped(leaves.middle, leaves.shading, leaves.color, weight, count, pixel)
+    count = int(group.max()) + 1
     normal = facing(leaves, group, count)
     side = np.where((leaves.normal * normal[group]).sum(axis=1) < 0, -1.0, 1.0)
     total = np.bincount(group, leaves.area, count).astype(np.float64)
