@@ -21,6 +21,7 @@ from vegtool.measure.views import views
 from vegtool.refine.coverage import (
     FACTORS,
     ROUNDS,
+    SURPLUS,
     expected,
     kept_until,
     measured_bias,
@@ -165,7 +166,7 @@ def solved(change: Callable[[Level, Truths], tuple[Level, Truths]]) -> Outcome:
     kept = kept_until(found.level)
     wrong = [
         found.rounds > ROUNDS,
-        abs(found.bias) > abs(first) + 1e-12,
+        abs(found.bias - SURPLUS) > abs(first - SURPLUS) + 1e-12,
         not FACTORS[0] <= found.factor <= FACTORS[1],
         not np.isfinite(kept),
     ]
