@@ -32,7 +32,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "convert": {"clustering", "boxes", "baking", "measure", "refine"},
     "batch": {"convert", "formats", "measure"},
     "stability": {
-        "branches", "clustering", "boxes", "gl", "baking", "measure", "convert", "growth",
+        "branches", "clustering", "boxes", "gl", "baking", "measure", "refine", "convert",
+        "growth",
     },
     "report": {
         "formats", "clustering", "gl", "measure", "baselines", "refine", "convert", "console",

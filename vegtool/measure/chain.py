@@ -177,9 +177,11 @@ class _Measuring:
 def _by_texels(levels: Sequence[Level], display: Display) -> list[float]:
     """Metres from which a texel of each level covers no more than a pixel: the distance that its
     atlas was made for. What is smeared is seen sooner than a mean error over the picture tells.
-    0 for a mesh, which has none."""
-    density = [level.texels_per_metre for level in levels]
-    return [display.distance_m(texels) if texels > 0 else 0.0 for texels in density]
+    A mesh, which has none, is likewise for the distances that it was made for."""
+    return [
+        display.distance_m(level.texels_per_metre) if level.texels else level.near_distance_m
+        for level in levels
+    ]
 
 
 def _unmeasured(
