@@ -110,7 +110,7 @@ def widest(away: FloatArray, weight: FloatArray, first: Ints, group: Ints) -> Fl
         pull = weight * np.einsum("nd,nd->n", away, direction[group])
         sums = np.add.reduceat(pull[:, None] * away, first)
         direction = np.where(np.any(sums, axis=1, keepdims=True), unit(sums), direction)
-    return direction
+    return np.asarray(direction)
 
 
 def settled(features: FloatArray, weight: FloatArray, group: Ints, count: int) -> Ints:
