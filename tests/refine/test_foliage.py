@@ -131,7 +131,7 @@ def test_rays_that_meet_a_label_twice_count_once() -> None:
 
 
 def group(middle: FloatArray, looks: FloatArray, weight: FloatArray, count: int) -> np.ndarray:
-    return grouped(middle, looks, np.ones((len(middle), 3)), weight, count, PIXEL)
+    return grouped(middle, looks, looks, np.ones((len(middle), 3)), weight, count, PIXEL)
 
 
 def test_halves_are_as_many_as_wanted_and_alike_in_weight() -> None:

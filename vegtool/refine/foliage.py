@@ -152,7 +152,8 @@ def reduced_leaves(
     weight = leaves.area * (UNSEEN + (1 - UNSEEN) * leaves.seen)
     count = min(triangles, len(leaves))
     pixel = pixel_m / leaves.radius
-    group = grouped(leaves.middle, leaves.shading, leaves.color, weight, count, pixel)
+    look = leaves.normal, leaves.shading, leaves.color
+    group = grouped(leaves.middle, *look, weight, count, pixel)
     count = int(group.max()) + 1
     normal = facing(leaves, group, count)
     side = np.where((leaves.normal * normal[group]).sum(axis=1) < 0, -1.0, 1.0)

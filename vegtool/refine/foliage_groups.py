@@ -35,6 +35,7 @@ def mean_of(values: FloatArray, weight: FloatArray, group: Ints, count: int) -> 
 
 def grouped(
     middle: FloatArray,
+    normal: FloatArray,
     shading: FloatArray,
     color: FloatArray,
     weight: FloatArray,
@@ -43,14 +44,13 @@ def grouped(
 ) -> Ints:
     """(n,) labels 0 to count - 1 of n leaves, n >= count, each of which some leaf has.
 
-    middle, shading, color: (n, 3); shading normals tell no front from back. weight: (n,) area, in
+    middle, normal, shading, color: (n, 3). A leaf that lies the other way round, both its
+    normals turned, looks the same: the tensor of both does not tell. weight: (n,) area, in
     square units of the middles. pixel: what one covers, in their units; what is nearer than that
     is in one place.
     """
     size = max(float(np.sqrt(weight.sum() / count)), pixel)
-    x, y, z = shading.T
-    both = np.sqrt(2)  # a scalar product of tensors counts what is off the diagonal twice
-    looks = np.stack([x * x, y * y, z * z, both * x * y, both * x * z, both * y * z], axis=1)
+    looks = (normal[:, :, None] * shading[:, None]).reshape(-1, 9)
     features = np.concatenate([middle, ORIENTATION * size * looks, COLOR * size * color], axis=1)
     return settled(features, weight, split(features, weight, count), count)
 
