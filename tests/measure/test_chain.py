@@ -23,7 +23,7 @@ from vegtool.measure.scores import Scores
 from vegtool.plant import Plant
 
 pytestmark = pytest.mark.gl
-OPTIONS = ConvertOptions(billboards=48, levels=2)
+OPTIONS = ConvertOptions(billboards=48, levels=2, refine="none")
 Curves = Callable[[Callable[[float], Sequence[float]]], None]
 
 
@@ -60,8 +60,10 @@ def curves(monkeypatch: pytest.MonkeyPatch) -> Curves:
     return use
 
 
-def test_every_level_is_within_the_limit_where_it_starts(bush: Plant) -> None:
-    chain = convert(bush, OPTIONS)
+@pytest.mark.parametrize("refine", ["full", "none"])
+def test_every_level_is_within_the_limit_where_it_starts(refine: str, bush: Plant) -> None:
+    options = replace(OPTIONS, refine=refine)
+    chain = convert(bush, options)
     levels = chain.levels[1:]
     assert levels
     for level in levels:
@@ -71,7 +73,7 @@ def test_every_level_is_within_the_limit_where_it_starts(bush: Plant) -> None:
         assert set(level.measured.errors) == set(METRICS)
     starts = [level.near_distance_m for level in levels]
     assert all((1 + FADE_FRACTION) * a <= b for a, b in pairwise(starts))
-    again = convert(bush, OPTIONS)
+    again = convert(bush, options)
     assert [level.measured for level in again.levels[1:]] == [level.measured for level in levels]
 
 
@@ -95,6 +97,18 @@ def test_a_level_starts_where_its_curve_crosses_the_limit(
     assert coarser.near_distance_m == pytest.approx(texel, rel=0.01), "a texel covers a pixel"
     assert finer.measured is not None
     assert finer.measured.held_out is not None
+
+
+def test_a_mesh_is_used_no_nearer_than_it_was_made_for(
+    bush: Plant, by_rule: LodChain, curves: Curves
+) -> None:
+    """It has no texels that could be too large, and may err little all the same."""
+    curves(lambda pixels: (0.2, 0.1))
+    made_for = by_rule.levels[1].near_distance_m
+    mesh = Level("mesh", mesh=bush, near_distance_m=made_for)
+    ((level,), _) = with_distances(bush, [mesh], MeasureOptions(), Display())
+    assert level.near_distance_m == pytest.approx(made_for, rel=0.01)
+    assert level.near_distance_m >= made_for
 
 
 def test_where_none_suffices_at_usual_sizes_smaller_ones_are_tried(

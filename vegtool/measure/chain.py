@@ -179,7 +179,7 @@ def _by_texels(levels: Sequence[Level], display: Display) -> list[float]:
     atlas was made for. What is smeared is seen sooner than a mean error over the picture tells.
     A mesh, which has none, is likewise for the distances that it was made for."""
     return [
-        display.distance_m(level.texels_per_metre) if level.texels else level.near_distance_m
+        display.distance_m(level.texels_per_metre) if level.atlas else level.near_distance_m
         for level in levels
     ]
 
