@@ -91,7 +91,7 @@ def _caption(level: Level, number: int) -> list[tuple[str, tuple[int, int, int]]
             shown += f" ({level.mesh_triangles:,} of a mesh)"
         atlas = f"atlas {width} x {height}"
     lines = [
-        (f"LOD{number}, from {level.near_distance_m:.3g} m", INK),
+        (f"LOD{number}, from {level.near_distance_m:g} m", INK),
         (shown, FAINT),
         (atlas, FAINT),
     ]
