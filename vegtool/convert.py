@@ -1,9 +1,10 @@
 """The pipeline for one plant: Plant and options in, a chain of levels out.
 
-After Colditz et al. 2005, section 2: clusters of the plant's faces, a box around each, one to three
-billboards per box, textures baked from the faces. Every billboard level is made for half the size
-on the screen of the one before, with about a third of its billboards, and its atlas holds one texel
-per pixel at that size. From where it may be used is measured then (measure/chain.py).
+Every level is made for half the size on the screen of the one before, with half of its triangles,
+and its atlas, where it has one, holds one texel per pixel at that size. What makes it is
+refine/level.py or, with --refine none, the method of Colditz et al. 2005, section 2: clusters of
+the plant's faces, a box around each, one to three billboards per box, textures baked from the
+faces. From where it may be used is measured then (measure/chain.py).
 """
 
 from __future__ import annotations
@@ -91,8 +92,8 @@ class ConvertOptions:
         "Size on the screen that the first level is made for, in pixels of the plant's longest "
         f"side, and each level for half of it [by --billboards: {NEAR_PIXELS[0]:g} for "
         f"{NEAR_PIXELS[1]}].",
-        least=8.0,
-        most=4096.0,
+        least=NEAR_LIMITS[0],
+        most=NEAR_LIMITS[1],
     )
     refine: str = option(
         "full",
@@ -111,6 +112,13 @@ class ConvertOptions:
         BoxOptions().shape,
         "Billboards per cluster of --refine none: by the box's form, one, or crossed.",
         choices=get_args(Shape),
+    )
+    occlusion: float = option(
+        0.0,
+        "Ambient occlusion put into colours, the original's too: how much darker is what the plant "
+        "itself hides from all sides. 1 is all of it, 0 none.",
+        least=0.0,
+        most=1.0,
     )
     max_texture: int = option(
         BakeOptions().max_texture, "Largest side of an atlas, in texels.", least=16, most=16384
@@ -148,7 +156,7 @@ def convert(
 ) -> LodChain:
     """Make the chain of levels of one plant.
 
-    levels[0] is the plant itself, the others are billboards: one at least, and no more than save
+    levels[0] is the plant itself. Of the others there is one at least, and no more than save
     triangles and may be used somewhere; `notes` name those that are of no use. Raises UsageError
     for options out of range, QualityError where no level keeps to `measure.max_error`,
     CapabilityError where nothing can draw.
@@ -161,13 +169,17 @@ def convert(
     options, measure = options or ConvertOptions(), measure or MeasureOptions()
     check_limits(options)
     check_limits(measure)
+    if options.occlusion:
+        from vegtool.refine.occlusion import occluded
+
+        plant = occluded(plant, options.occlusion)
     making = 1.0 if measure.measure == "off" else MAKING
     levels = [Level("mesh", mesh=plant, geometric_error_m=(0.0, 0.0))]
     counts = billboard_counts(plant, options)
     with PlantBuffers(plant) as buffers:
         truth_at = TruthsAt(plant, views_of(measure), options.display, buffers)
         make = level_maker(buffers, truth_at, options)
-        size = min(max(options.pixels or near_pixels(counts[0]), NEAR_LIMITS[0]), NEAR_LIMITS[1])
+        size = options.pixels or near_pixels(counts[0])
         near = rounded_up(distance_of(plant, options.display, size))
         for index, count in enumerate(counts):
 

@@ -83,8 +83,9 @@ class Billboards:
 class Atlas:
     """The textures of a level, and where in them each billboard's picture lies.
 
-    color: (h, w, 4) uint8, sRGB, straight alpha: coverage, fitted in each picture so that as much
-    of it passes a test at 128 as is covered; colour dilated under alpha 0.
+    color: (h, w, 4) uint8, sRGB, straight alpha, such that as much passes a test at 128 as is
+    covered: in each picture (baking/coverage.py), or seen from all sides (refine/coverage.py).
+    Colour is carried on where nothing is covered.
     normal: (h, w, 3) uint8, tangent space of the billboard (x along u, y along v); blue is above
     one half but where the source's own shading normals point away from the side that is seen.
     depth: (h, w) uint16, signed depth along the side's own normal over the billboard's half_depth:

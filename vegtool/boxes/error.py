@@ -24,11 +24,12 @@ def geometric_error(
 ) -> tuple[float, float]:
     """Greatest and 95th percentile distance, metres, from surface points to where they are drawn.
 
-    labels: (f,) the cluster of each face; -1 for faces that no billboard shows. billboards: None for
-    a level of mesh alone. mesh: of a mixed level; by_mesh: (f,) bool, the faces that it shows. What shows a point counts: its plane, of
-    crossed planes the nearest one, or the nearest place of the mesh. Points are spread evenly over
-    the area, the same ones at every call; what nothing shows is left out. Raises ValueError where a
-    cluster that has faces has no billboard, and where nothing is shown.
+    labels: (f,) the cluster of each face; -1 for faces that no billboard shows. billboards: None
+    for a level that is a mesh alone. mesh: of a level that has one; by_mesh: (f,) bool, the faces
+    that it shows. What shows a point counts: its plane, of crossed planes the nearest one, or the
+    nearest place of the mesh. Points are spread evenly over the area, the same ones at every call;
+    what nothing shows is left out. Raises ValueError where a cluster that has faces has no
+    billboard, and where nothing is shown.
     """
     face, points = surface_samples(plant, SAMPLES)
     distance = np.full(len(points), np.inf)

@@ -1,1 +1,1 @@
-"""Levels closer to the truth than the live original: coverage, colour and planes by measured error."""
+"""Levels closer to the truth than the live original, by measured error."""

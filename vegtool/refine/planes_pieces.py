@@ -89,7 +89,8 @@ def pieces_of(plant: Plant, of_face: Labels) -> tuple[Pieces, FloatArray, float]
 
 def tensor(vectors: FloatArray) -> FloatArray:
     """(n, 6) the tensors v v^T of vectors (n, 3)."""
-    return np.stack([vectors[:, i] * vectors[:, j] for i, j in AXES], axis=1) * TWICE
+    squares = [vectors[:, i] * vectors[:, j] for i, j in AXES]
+    return np.asarray(np.stack(squares, axis=1) * TWICE)
 
 
 def together(pieces: Pieces, labels: Labels) -> Pieces:
