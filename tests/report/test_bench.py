@@ -142,7 +142,8 @@ def chain(made: dict[str, tuple[Row, Any]]) -> list[Row]:
         row, _ = made[name]
         values = {**row.values, "flip": tuple((f, f) for f in flips)}
         distances = (10.0, 20.0, 40.0, 80.0, 160.0)
-        return replace(row, distance_m=distances, values=values, texels_per_metre=0.0)
+        bare = replace(row, texels_per_metre=0.0, made_for_pixels=None)
+        return replace(bare, distance_m=distances, values=values)
 
     return [
         erring("live", 0.2, 0.2, 0.2, 0.2, 0.2),
@@ -174,6 +175,18 @@ def test_coarse_texels_and_displacement_move_distances_away(
     found = _with_distances([*bounded, impostor], limited)
     assert found[1].switch_distance_m == pytest.approx(40.0, rel=0.01)
     assert found[3].why_not == "how far it displaces things is not known"
+
+
+def test_a_level_without_texels_starts_where_it_was_made_for(
+    made: dict[str, tuple[Row, Any]],
+) -> None:
+    """30 billboards suffice from 20 m on, where the plant is half as high as at 10 m."""
+    live, finer, *_ = chain(made)
+    mesh = replace(finer, family="refined", made_for_pixels=finer.pixels[0] / 3)
+    assert _with_distances([live, mesh], OPTIONS)[1].switch_distance_m is None, "errs at 160 m"
+    right = replace(mesh, values=live.values)
+    found = _with_distances([live, right], OPTIONS)[1].switch_distance_m
+    assert found == pytest.approx(30.0, rel=0.01)
 
 
 def test_a_limit_is_checked_from_views_that_distances_were_not_chosen_by(

@@ -30,7 +30,7 @@ from vegtool.progress import Progress
 from vegtool.report.bench import Bench, measured, set_up
 from vegtool.report.entries import Entry, entries
 from vegtool.report.journal import Journal
-from vegtool.report.options import ReportOptions
+from vegtool.report.options import FAMILIES, ReportOptions
 from vegtool.report.pictures import of_truth, sizes_of
 from vegtool.report.rows import LIVE, TRUTH, Pictures, PlantReport, Report, Row, as_json, from_json
 
@@ -192,9 +192,12 @@ def misses(report: Report) -> list[str]:
 
 def _least_m(row: Row, options: ReportOptions) -> float | None:
     """Metres from which a row's texels are small enough, and what it displaces little enough; None
-    where that is not known."""
-    texels = row.texels_per_metre
-    near = options.display.distance_m(texels) if texels else 0.0
+    where that is not known. A level of ours without texels starts where it was made for."""
+    near = 0.0
+    if row.texels_per_metre:
+        near = options.display.distance_m(row.texels_per_metre)
+    elif row.family in FAMILIES and row.made_for_pixels:
+        near = row.distance_m[0] * row.pixels[0] / row.made_for_pixels
     if options.max_pixels is None:
         return near
     return None if row.within_pixels_from_m is None else max(near, row.within_pixels_from_m)
