@@ -157,6 +157,18 @@ def test_settled_groups_are_as_many_and_nearer_together() -> None:
     assert spread(found) < 0.95 * spread(halves)
 
 
+def test_leaves_lit_from_different_sides_are_parted_however_they_lie() -> None:
+    # crown normals: the fronts of some leaves look out, and the backs of others
+    middle = np.random.default_rng(3).normal(size=(200, 3)) * 0.01
+    out, over, nth = np.array([[0.0, 1, 0]]), np.ones((200, 3)), np.arange(200)[:, None]
+    normal, shading = np.where(nth % 2, out, -out), np.repeat(out, 200, axis=0)
+    labels = grouped(middle, normal, shading, over, np.ones(200), 2, PIXEL)
+    assert (labels[::2] == labels[0]).all() and labels[0] != labels[1]
+    turned = np.where(nth % 3, -1.0, 1.0)  # the same leaves, wound the other way
+    again = grouped(middle, normal * turned, shading * turned, over, np.ones(200), 2, PIXEL)
+    np.testing.assert_array_equal(again, labels)
+
+
 def test_groups_that_are_lost_are_made_up_for_where_leaves_spread_most() -> None:
     features = np.array([[0.0], [0.1], [5], [9], [20], [20]])
     weight = np.ones(6)
@@ -209,6 +221,7 @@ def test_two_opposite_single_sided_leaves_are_one_leaf() -> None:
     corners = crown(300, 0.1)
     both = plant_of(corners)
     pair = plant_of(np.concatenate([corners, corners[:, ::-1]]), double_sided=False)
+    pair = replace(pair, normals=np.concatenate([both.normals, -both.normals]))
     a, b = (leaves_of(plant, every(plant)) for plant in (both, pair))
     assert a is not None and b is not None
     np.testing.assert_allclose(b.area.sum(), a.area.sum())
