@@ -157,8 +157,8 @@ def convert(
     """Make the chain of levels of one plant.
 
     levels[0] is the plant itself. Of the others there is one at least, and no more than save
-    triangles and may be used somewhere; `notes` name those that are of no use. Raises UsageError
-    for options out of range, QualityError where no level keeps to `measure.max_error`,
+    triangles and may be used somewhere; `notes` name those that are of no use, and those that are
+    used farther than their coverage keeps. Raises UsageError for options out of range, QualityError where no level keeps to `measure.max_error`,
     CapabilityError where nothing can draw.
     """
     from vegtool.baking.bake import PlantBuffers
@@ -200,6 +200,10 @@ def convert(
             lambda stage, fraction: progress(stage, making + (1 - making) * fraction),
             truth_at,
         )
+        if options.refine != "none":
+            from vegtool.refine.reach import coverage_notes
+
+            notes = (*notes, *coverage_notes(kept, truth_at))
     progress("levels", 1.0)
     told = {**asdict(options), **asdict(measure)}
     return LodChain(plant.name, (levels[0], *kept), options.display, options.seed, told, notes)

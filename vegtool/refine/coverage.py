@@ -74,10 +74,6 @@ POWER, POWERS = 0.8, (0.3, 1.5)
 """Coverage on the screen grows as that power of what pictures cover: leaves hide leaves."""
 NOTHING = 1e-3
 """Of the truth's coverage, or of a factor."""
-LOST = 0.05
-"""Share of its coverage that a level may lose before it has been used too far."""
-FARTHEST_SEEN = 16.0
-"""Times the near end: coverage is followed no farther."""
 ANGLES, TURNS, DISTANCES = 64, 8, 9
 """Samples of the directions and distances from which a billboard is seen."""
 
@@ -202,28 +198,6 @@ def next_factor(tried: Sequence[Solved]) -> float:
     excess = max(1 + last.bias, NOTHING) / (1 + SURPLUS)
     wanted = last.factor * excess ** (-1 / power)
     return float(np.clip(wanted, *FACTORS))
-
-
-def kept_until(level: Level, density: float = 1.0) -> float:
-    """How many times farther than its near end a level's pictures may be seen until they are
-    expected to show LOST less than there; at most FARTHEST_SEEN.
-
-    level: with its final alpha. density: texels per pixel at the near end, seen from in front.
-    """
-    atlas = level.atlas
-    if atlas is None:
-        return FARTHEST_SEEN
-    image = atlas.color[..., 3].astype(np.float32)
-    owner = owners(image.shape, pictures(atlas))
-    shown = np.array(
-        [
-            float(np.count_nonzero(values >= PASS))
-            for _, values, _ in sampled(image, owner, np.ones(len(MIPS)))
-        ]
-    )
-    away = np.geomspace(1.0, FARTHEST_SEEN, 1 + 12 * int(np.log2(FARTHEST_SEEN)))
-    kept = np.array([seen_at(density * d, 1.0) @ shown for d in away])
-    return float(away[np.argmin(np.append(kept >= (1 - LOST) * kept[0], False)) - 1])
 
 
 def with_alpha(level: Level, alpha: ByteArray) -> Level:
