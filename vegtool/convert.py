@@ -158,8 +158,8 @@ def convert(
 
     levels[0] is the plant itself. Of the others there is one at least, and no more than save
     triangles and may be used somewhere; `notes` name those that are of no use, and those that are
-    used farther than their coverage keeps. Raises UsageError for options out of range, QualityError where no level keeps to `measure.max_error`,
-    CapabilityError where nothing can draw.
+    used farther than their coverage keeps. Raises UsageError for options out of range, QualityError
+    where no level keeps to `measure.max_error`, CapabilityError where nothing can draw.
     """
     from vegtool.baking.bake import PlantBuffers
     from vegtool.measure.chain import views_of, with_distances
