@@ -32,6 +32,21 @@ def test_a_seam_is_welded_within_a_part_and_touching_parts_stay_apart():
     assert np.array_equal(parts.vertex_part[parts.faces[:, 0]], parts.face_part)
 
 
+def test_a_tube_cut_along_its_rings_is_one_part():
+    """As exporters write it that split vertices where tangents change: bands of twelve faces each."""
+    vertices, faces = tube((0, 0, 0), (0, 0.5, 0))
+    bands = faces.reshape(-1, 12, 3)
+    assert len(bands) > 2
+    corners, cut = [], []
+    for band in bands:
+        own, index = np.unique(band, return_inverse=True)
+        cut.append(index.reshape(-1, 3) + sum(map(len, corners)))
+        corners.append(vertices[own])
+    apart = connected_parts(np.concatenate(corners), np.concatenate(cut))
+    assert apart.count == 1
+    assert len(apart.positions) == connected_parts(vertices, faces).vertex_part.size
+
+
 def test_vertices_are_numbered_as_the_faces_show_them():
     vertices, faces = tube((0, 0, 0), (0, 0.5, 0))
     parts = connected_parts(vertices, faces[::-1])

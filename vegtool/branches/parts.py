@@ -18,6 +18,7 @@ Labels = np.ndarray
 
 WELD = 2.0**-19  # grid step, as a fraction of the plant's radius about its mean corner
 SOUP_FACES_PER_PART = 2.5  # index-connected parts smaller than this on average are no tubes
+CUT_FACES_PER_PART = 16.0  # smaller than this, tubes may be cut to pieces along their rings
 RUNS_PER_PART = 1.5  # at most so many stretches of the file per part: the order means something
 
 
@@ -50,6 +51,8 @@ def connected_parts(positions: FloatArray, faces: np.ndarray) -> Parts:
     part = _face_parts(faces)
     if len(faces) < SOUP_FACES_PER_PART * (part.max() + 1):
         part = _soup_parts(place)
+    elif len(faces) < CUT_FACES_PER_PART * (part.max() + 1):
+        part = _sewn(place, part)
     part, _ = _by_first(part)
     vertex, first = _by_first((part[:, None] * (place.max() + 1) + place).ravel())
     corner = faces.ravel()[first]
@@ -89,6 +92,17 @@ def _dense(labels: Labels) -> Labels:
 def _face_parts(faces: np.ndarray) -> Labels:
     a, b = faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel()
     return np.asarray(components(int(faces.max()) + 1, a, b)[faces[:, 0]])
+
+
+def _sewn(place: np.ndarray, part: Labels) -> Labels:
+    """Parts that share whole edges made one, as of a tube whose vertices are split where its normals
+    or tangents change. Tubes that only touch share no edge."""
+    edge = np.sort(place[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    key = edge[:, 0] * (place.max() + 1) + edge[:, 1]
+    order = np.argsort(key, kind="stable")
+    same = np.flatnonzero(np.diff(key[order]) == 0)
+    of_edge = np.repeat(part, 3)[order]
+    return components(int(part.max()) + 1, of_edge[same], of_edge[same + 1])[part]
 
 
 def _soup_parts(place: np.ndarray) -> Labels:

@@ -36,9 +36,9 @@ from vegtool.timing import timed
 
 REACH = 2.0
 """A level is made for distances up to so many times its nearest: there the next one begins."""
-SMALL = 6.0
+SMALL = 12.0
 """Pixels: side of a square as large as what one triangle of leaves covers, up to which triangles
-are tried. Farther than twice that they never erred less than pictures."""
+are tried. On five plants they erred less than pictures up to 8, and more from 14 on."""
 
 
 @dataclass(frozen=True, eq=False)
