@@ -33,7 +33,7 @@ def test_a_seam_is_welded_within_a_part_and_touching_parts_stay_apart():
 
 
 def test_a_tube_cut_along_its_rings_is_one_part():
-    """As exporters write it that split vertices where tangents change: bands of twelve faces each."""
+    """As exporters write it that split vertices where tangents change: bands of twelve faces."""
     vertices, faces = tube((0, 0, 0), (0, 0.5, 0))
     bands = faces.reshape(-1, 12, 3)
     assert len(bands) > 2

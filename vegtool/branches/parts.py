@@ -95,8 +95,8 @@ def _face_parts(faces: np.ndarray) -> Labels:
 
 
 def _sewn(place: np.ndarray, part: Labels) -> Labels:
-    """Parts that share whole edges made one, as of a tube whose vertices are split where its normals
-    or tangents change. Tubes that only touch share no edge."""
+    """Parts that share whole edges made one, as of a tube whose vertices are split where its
+    normals or tangents change. Tubes that only touch share no edge."""
     edge = np.sort(place[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     key = edge[:, 0] * (place.max() + 1) + edge[:, 1]
     order = np.argsort(key, kind="stable")
