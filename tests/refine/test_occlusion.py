@@ -27,8 +27,8 @@ def shells(layers: int) -> Plant:
             positions.append(layer / layers * out + 0.06 * (a * across + b * up))
             normals.append(out)
     at = np.stack(positions, 1).reshape(-1, 3)
-    first = 4 * np.arange(len(at) // 4, dtype=np.int32)[:, None]
-    faces = np.concatenate([first + [0, 1, 2], first + [0, 2, 3]], axis=1).reshape(-1, 3)
+    first = 4 * np.arange(len(at) // 4, dtype=np.int32)
+    faces = (first[:, None] + np.array([0, 1, 2, 0, 2, 3])).reshape(-1, 3)
     return Plant(
         "ball",
         at,

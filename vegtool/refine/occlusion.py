@@ -1,10 +1,10 @@
 """A plant whose own shade is in its colours: ambient occlusion.
 
-Landis, "Production-ready global illumination" (2002): a point is darkened by the share of directions
-from which the plant itself hides it. That share is the one that planes are weighed by: foliage as a
-turbid medium (planes_seen.py), so nothing is drawn and single leaves cast no edges. It goes into the
-colours of vertices, which everything that is made of the plant takes over: levels, the original
-beside them, and the truth that both are measured against.
+Landis, "Production-ready global illumination" (2002): a point is darkened by the share of
+directions from which the plant itself hides it. That share is the one that planes are weighed by:
+foliage as a turbid medium (planes_seen.py), so nothing is drawn and single leaves cast no edges. It
+goes into the colours of vertices, which everything that is made of the plant takes over: levels,
+the original beside them, and the truth that both are measured against.
 """
 
 from __future__ import annotations
