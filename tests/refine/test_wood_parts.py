@@ -10,10 +10,10 @@ from refine.wood_cases import all_of, straight, tree, tube, wood
 
 from vegtool.arrays import FloatArray
 from vegtool.plant import Material, Plant, Texture
+from vegtool.refine.face_texels import face_colors, opacities
 from vegtool.refine.wood_choice import THICKEST, Screen
-from vegtool.refine.wood_color import face_colors
 from vegtool.refine.wood_lumps import Surface, lumps
-from vegtool.refine.wood_seen import opacity, seen_through
+from vegtool.refine.wood_seen import seen_through
 from vegtool.refine.wood_shadow import Shadows
 from vegtool.refine.wood_stems import Stems, halved, stems_of
 from vegtool.srgb import linear_from_srgb
@@ -197,6 +197,9 @@ def test_what_is_cut_out_hides_nothing() -> None:
     clear = np.zeros((4, 4, 4), np.uint8)
     leaf = replace(plant.materials[0], alpha_mode="mask", color_texture=Texture("leaf", clear))
     gone = replace(plant, materials=(leaf,))
-    assert not opacity(gone, all_of(gone)).any()
+    assert not opacities(gone, all_of(gone)).any()
     seen, covered = seen_through(gone, all_of(gone), points)
     assert seen[0] == 1 and covered == 0
+    # a material may be cut away by its factor alone
+    leaf = replace(leaf, color_texture=None, base_color=np.array([1.0, 1, 1, 0.4]))
+    assert not opacities(replace(gone, materials=(leaf,)), all_of(gone)).any()

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from vegtool.arrays import FloatArray, IntArray
 from vegtool.plant import Material, Plant
+from vegtool.refine.face_texels import texels
 from vegtool.srgb import linear_from_srgb
 
 ROWS = 32
@@ -104,12 +105,7 @@ def _texels(material: Material, uv: FloatArray) -> tuple[npt.NDArray[np.bool_], 
         if material.alpha_mode == "mask":
             covered[:] = factor[3] >= material.alpha_cutoff
         return covered, np.broadcast_to(factor[:3], (*uv.shape[:2], 3))
-    pixels = material.color_texture.pixels
-    height, width = pixels.shape[:2]
-    uv = uv - np.floor(uv)
-    x = np.minimum((uv[..., 0] * width).astype(np.int64), width - 1)
-    y = np.minimum((uv[..., 1] * height).astype(np.int64), height - 1)
-    texel = pixels[y, x]
+    texel = texels(material.color_texture.pixels, uv)
     if material.alpha_mode == "mask":
         covered = texel[..., 3] * (factor[3] / 255) >= material.alpha_cutoff
     light = linear_from_srgb(np.arange(256) / 255)

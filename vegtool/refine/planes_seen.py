@@ -12,6 +12,7 @@ import numpy as np
 
 from vegtool.arrays import FloatArray, unit
 from vegtool.plant import Plant
+from vegtool.refine.face_texels import opacities
 from vegtool.refine.planes_pieces import Pieces, tensor
 
 DIRECTIONS = 24
@@ -20,8 +21,6 @@ COLUMN = 3.0
 """Side of a column, in sizes of a piece."""
 MOST_COLUMNS = 1 << 31
 """Of a row."""
-POINTS = np.array([[4, 1, 1], [1, 4, 1], [1, 1, 4], [2, 2, 2]]) / 6
-"""Barycentric, where a face's texture is looked at."""
 
 
 def seen(pieces: Pieces, surface: float, size: float, opacity: float) -> FloatArray:
@@ -66,18 +65,7 @@ def even_directions(count: int) -> FloatArray:
 
 def opacity(plant: Plant) -> float:
     """The share of a plant's surface that its materials do not cut away."""
-    passing = np.ones(len(plant.faces))
-    for index, material in enumerate(plant.materials):
-        texture = material.color_texture
-        rows = np.flatnonzero(plant.face_material == index)
-        if texture is None or material.alpha_mode == "opaque" or not len(rows):
-            continue
-        height, width = texture.pixels.shape[:2]
-        at = np.einsum("pc,fci->fpi", POINTS, plant.uvs[plant.faces[rows]]) % 1.0
-        x = np.minimum((at[..., 0] * width).astype(np.int64), width - 1)
-        y = np.minimum((at[..., 1] * height).astype(np.int64), height - 1)
-        alpha = texture.pixels[y, x, 3] / 255 * material.base_color[3]
-        passing[rows] = (alpha >= material.alpha_cutoff).mean(axis=1)
     area = plant.face_areas
     total = float(area.sum())
-    return float(area @ passing) / total if total > 0 else 1.0
+    shown = opacities(plant, np.arange(len(area), dtype=np.int32))
+    return float(area @ shown) / total if total > 0 else 1.0

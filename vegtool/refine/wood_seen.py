@@ -11,7 +11,7 @@ import numpy as np
 
 from vegtool.arrays import FloatArray, IntArray
 from vegtool.plant import Plant
-from vegtool.refine.wood_color import WITHIN
+from vegtool.refine.face_texels import opacities
 
 DIRECTIONS = 12
 CELLS = 24
@@ -24,7 +24,7 @@ def seen_through(plant: Plant, others: IntArray, points: FloatArray) -> tuple[Fl
     if not len(others):
         return np.ones(len(points)), 0.0
     center, radius = plant.center, plant.radius
-    covering = plant.face_area_vectors[others] * opacity(plant, others)[:, None] / radius**2
+    covering = plant.face_area_vectors[others] * opacities(plant, others)[:, None] / radius**2
     leaves = (plant.face_centroids[others] - center) / radius
     local = (points - center) / radius
     nth = np.arange(DIRECTIONS)
@@ -49,21 +49,3 @@ def seen_through(plant: Plant, others: IntArray, points: FloatArray) -> tuple[Fl
         seen += np.exp(-before[len(leaves) :] / size)
         covered += size * float((1 - np.exp(-np.bincount(key[order], area) / size)).sum())
     return seen / DIRECTIONS, covered / DIRECTIONS * radius**2
-
-
-def opacity(plant: Plant, faces: IntArray) -> FloatArray:
-    """(k,) how much of each face its texture's alpha leaves."""
-    result = np.ones(len(faces))
-    material = plant.face_material[faces]
-    for number in np.unique(material):
-        surface = plant.materials[number]
-        if surface.alpha_mode != "mask" or surface.color_texture is None:
-            continue
-        own = np.flatnonzero(material == number)
-        alpha = surface.color_texture.pixels[..., 3]
-        uv = np.einsum("pc,fci->fpi", WITHIN, plant.uvs[plant.faces[faces[own]]])
-        height, width = alpha.shape
-        x, y = np.moveaxis((uv - np.floor(uv)) * [width, height], 2, 0).astype(np.int64)
-        shown = alpha[np.minimum(y, height - 1), np.minimum(x, width - 1)] / 255
-        result[own] = (shown * surface.base_color[3] >= surface.alpha_cutoff).mean(axis=1)
-    return result

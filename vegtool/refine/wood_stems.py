@@ -21,7 +21,8 @@ from vegtool.branches.parts import Parts, connected_parts, weld
 from vegtool.branches.skeleton import skeleton
 from vegtool.branches.tubes import cut_tubes
 from vegtool.plant import Plant
-from vegtool.refine.wood_color import face_colors
+from vegtool.refine.face_texels import face_colors
+from vegtool.refine.wood_ends import flat_ends
 from vegtool.refine.wood_lines import Ints, Lines, lines_of, taper_areas, uneven
 from vegtool.refine.wood_lumps import Lump, Surface, lumps
 from vegtool.refine.wood_seen import seen_through
@@ -124,6 +125,10 @@ def stems_of(plant: Plant, faces: IntArray) -> Stems | None:
     low, high = used.min(axis=0), used.max(axis=0)
     center, radius = (low + high) / 2, float(np.linalg.norm(high - low) / 2)
     parts = parts_of(plant, faces, center, radius)
+    ends = flat_ends(parts)
+    if ends.any():
+        faces = faces[~ends]
+        parts = parts_of(plant, faces, center, radius)
     rings = skeleton(parts)
     tubes = cut_tubes(rings)
     lines = lines_of(parts, rings, tubes)
