@@ -102,7 +102,7 @@ def _sewn(place: np.ndarray, part: Labels) -> Labels:
     order = np.argsort(key, kind="stable")
     same = np.flatnonzero(np.diff(key[order]) == 0)
     of_edge = np.repeat(part, 3)[order]
-    return components(int(part.max()) + 1, of_edge[same], of_edge[same + 1])[part]
+    return np.asarray(components(int(part.max()) + 1, of_edge[same], of_edge[same + 1])[part])
 
 
 def _soup_parts(place: np.ndarray) -> Labels:
