@@ -129,7 +129,10 @@ def test_a_single_triangle_still_gets_a_level(refine: str, bush: Plant) -> None:
     )  # fmt: skip
     chain = convert(plant, ConvertOptions(levels=6, refine=refine), BY_RULE)
     assert len(chain.levels) == 2
-    assert chain.levels[1].near_distance_m > 20 * plant.height, "the far one"
+    near = chain.levels[1].near_distance_m
+    assert near > 20 * plant.height, "the far one"
+    size = plant.extent * chain.display.pixels_per_metre(near)
+    assert size == pytest.approx(8, rel=0.01), "and no smaller: a picture needs some texels"
 
 
 def test_counts_fall_by_half() -> None:

@@ -180,7 +180,10 @@ def convert(
         truth_at = TruthsAt(plant, views_of(measure), options.display, buffers)
         make = level_maker(buffers, truth_at, options)
         size = options.pixels or near_pixels(counts[0])
-        near = rounded_up(distance_of(plant, options.display, size))
+        near, farthest = (
+            rounded_up(distance_of(plant, options.display, pixels))
+            for pixels in (size, NEAR_LIMITS[0])
+        )
         for index, count in enumerate(counts):
 
             def report(stage: str, fraction: float, index: int = index) -> None:
@@ -188,7 +191,7 @@ def convert(
                 progress(f"LOD{index + 1}: {stage}", done)
 
             level = make(count, near, report)
-            near = rounded_up(LEVEL_RATIO * near)
+            near = min(rounded_up(LEVEL_RATIO * near), farthest)
             saves = level.triangles <= MOST_OF_PREVIOUS * levels[-1].triangles
             if saves or (index == len(counts) - 1 and len(levels) == 1):
                 levels.append(level)
