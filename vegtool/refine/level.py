@@ -36,6 +36,8 @@ from vegtool.timing import timed
 
 REACH = 2.0
 """A level is made for distances up to so many times its nearest: there the next one begins."""
+PER_BILLBOARD = 2
+"""Triangles."""
 SMALL = 12.0
 """Pixels: side of a square as large as what one triangle of leaves covers, up to which triangles
 are tried. On five plants they erred less than pictures up to 8, and more from 14 on."""
@@ -117,10 +119,12 @@ def refined_level(source: Source, wanted: Wanted, progress: Progress = silent) -
 
 
 def wood_of(source: Source, wanted: Wanted, pixel_m: float) -> Wood | None:
-    """The wood that a level shows as a mesh."""
+    """The wood that a level shows as a mesh; what else there is has a billboard at least."""
     if source.stems is None:
         return None
     count = wood_triangles(source.stems, wanted.triangles, pixel_m)
+    if len(source.leaf):
+        count = min(count, wanted.triangles - PER_BILLBOARD)
     return reduced_wood(source.stems, count, pixel_m)
 
 
@@ -139,7 +143,7 @@ def on_planes(
     by_mesh[source.wood] = wood is not None
     with timed(seconds, "planes"):
         shown = np.flatnonzero(~by_mesh).astype(np.int32)
-        count = max(triangles // 2, 1)
+        count = max(triangles // PER_BILLBOARD, 1)
         labels, billboards = planes(plant, shown, count, 1 / density, seed=wanted.seed)
         labels = np.where(by_mesh, -1, labels).astype(np.int32)
     how = BakeOptions(max_texture=wanted.max_texture, fit_alpha=False)

@@ -31,7 +31,7 @@ def coverage_notes(levels: Sequence[Level], truth_at: TruthsAt) -> tuple[str, ..
         if bias is not None and abs(bias) > KEPT:
             notes.append(
                 f"the level of {level.triangles:,} triangles covers {abs(bias):.0%} "
-                f"{'more' if bias > 0 else 'less'} than the plant from {far_m:.4g} m, up to where "
+                f"{'more' if bias > 0 else 'less'} than the plant from {far_m:g} m, up to where "
                 "it is used; more --levels may come closer"
             )
     return tuple(notes)

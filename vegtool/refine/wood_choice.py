@@ -46,8 +46,8 @@ in pixels where it is thinner: a picture shows a part of the mean. From the same
 DISPLACED = 2.0
 """The most of it: all is missing in its place, and as much is too much elsewhere."""
 TIP = 0.5
-"""Of the girth at the last ring but one: a stem whose end is thinner, or thinner than a pixel, ends
-in a point."""
+"""Of the girth at the last ring but one: a stem whose end is thinner ends in a point. So does one
+that grows from another and ends thinner than a pixel; a trunk's last ring may be its foot."""
 THICKEST = 1.0
 """Pixels: stems that stand for others are made no thicker than this, if they are not themselves.
 Surface that is lost so is worth less than the sight of a club."""
@@ -113,7 +113,7 @@ class Screen:
             worth[begin:end] = np.minimum(worth[begin:end], worth[spans.parent[begin:end]])
         whole = slice(0, len(stems))
         before, tip = stems.girth[stems.last - 1], stems.girth[stems.last]
-        pointed = (tip < TIP * before) | (tip / np.pi < pixel)
+        pointed = (tip < TIP * before) | ((tip / np.pi < pixel) & (stems.host >= 0))
         covered = surface[whole] / 4 / pixel**2
         rough = np.minimum(2 * along[whole] * stems.rough / pixel**2, covered)
         return Screen(
