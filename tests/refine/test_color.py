@@ -73,7 +73,7 @@ def test_twice_is_once(tree: tuple[Level, Truths]) -> None:
 
 
 def test_the_part_that_is_seen_most_changes_most() -> None:
-    """Of the line of factors with the sum that is wanted, the foot of the perpendicular from (1, 1)."""
+    """Of the line of factors with the sum wanted, the foot of the perpendicular from (1, 1)."""
     a, b = gains(Shares(0.6, 0.2))
     assert a * 0.6 + b * 0.2 == pytest.approx(BRIGHTER)
     assert (a - 1) / (b - 1) == pytest.approx(3.0)
