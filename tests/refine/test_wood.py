@@ -12,10 +12,10 @@ from refine.wood_cases import all_of, straight, tree, tube, wood
 
 from vegtool.arrays import FloatArray
 from vegtool.plant import Material, Plant
+from vegtool.refine.hits import Rays, hits, rays_met
 from vegtool.refine.wood import Wood, reduced_wood, stems_of, wood_triangles
 from vegtool.refine.wood_choice import Screen
 from vegtool.refine.wood_mesh import joined
-from vegtool.refine.wood_shadow import Shadows
 
 FINE = 1e-3
 """Metres per pixel at which all of these are large on the screen."""
@@ -33,9 +33,8 @@ def reduced(plant: Plant, triangles: int, pixel_m: float = FINE) -> Wood:
 
 def covered(corners: FloatArray, like: FloatArray) -> float:
     """What triangles cover in the mean over many views, on grids around others."""
-    around = Shadows.around(like)
-    shadows = Shadows(around.middle, around.extent, directions=24, cells=300)
-    return float(shadows.of(corners).sum() * shadows.cell)
+    rays = Rays.around(like, directions=24, cells=300)
+    return float(rays_met(rays, hits(rays, corners)).sum() * rays.cell)
 
 
 def mean_shadow(made: Wood) -> float:
@@ -80,11 +79,12 @@ def test_a_curve_is_followed_as_closely_as_its_triangles_allow() -> None:
     path = 3 * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
     plant = wood(tube(path, np.full(33, 0.1)))
     wrong = []
-    shadows = Shadows.around(plant.corners)
-    truth = shadows.of(plant.corners)
+    rays = Rays.around(plant.corners)
+    truth = rays_met(rays, hits(rays, plant.corners))
     for triangles in (8, 24, 80, 320):
         made = reduced(plant, triangles)
-        wrong.append((shadows.of(made.positions[made.faces]) != truth).sum() / truth.sum())
+        drawn = rays_met(rays, hits(rays, made.positions[made.faces]))
+        wrong.append((drawn != truth).sum() / truth.sum())
     assert wrong == sorted(wrong, reverse=True)
     assert wrong[0] > 1  # a straight line in place of half a circle
     assert wrong[-1] < 0.1

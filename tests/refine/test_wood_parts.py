@@ -11,10 +11,10 @@ from refine.wood_cases import all_of, straight, tree, tube, wood
 from vegtool.arrays import FloatArray
 from vegtool.plant import Material, Plant, Texture
 from vegtool.refine.face_texels import face_colors, opacities
+from vegtool.refine.hits import Rays, hits, rays_met
 from vegtool.refine.wood_choice import THICKEST, Screen
 from vegtool.refine.wood_lumps import Surface, lumps
 from vegtool.refine.wood_seen import seen_through
-from vegtool.refine.wood_shadow import Shadows
 from vegtool.refine.wood_stems import Stems, halved, stems_of
 from vegtool.srgb import linear_from_srgb
 
@@ -34,8 +34,8 @@ def stems(plant: Plant) -> Stems:
 
 def test_the_mean_shadow_of_a_convex_body_is_a_quarter_of_its_surface() -> None:
     corners = box(np.array([1.0, 2, 3]))
-    shadows = Shadows.around(corners)
-    assert shadows.of(corners).sum() * shadows.cell == pytest.approx(22 / 4, rel=0.01)
+    rays = Rays.around(corners, half=True)
+    assert rays_met(rays, hits(rays, corners)).sum() * rays.cell == pytest.approx(22 / 4, rel=0.01)
 
 
 def test_every_stretch_has_the_surface_that_stands_there() -> None:
@@ -134,10 +134,10 @@ def test_lumps_cover_as_much_as_the_whole() -> None:
         np.stack([0 * np.arange(7), np.arange(7), 0 * np.arange(7)], axis=1).astype(float),
     )
     covered, found = lumps(surface)
-    shadows = Shadows.around(plant.corners)
+    rays = Rays.around(plant.corners)
     assert len(found) > 5
     for lump in found[:-3]:  # the last are too crude to be swollen enough
-        drawn = shadows.of(lump.positions[lump.faces]).sum() * shadows.cell
+        drawn = rays_met(rays, hits(rays, lump.positions[lump.faces])).sum() * rays.cell
         assert drawn == pytest.approx(covered, rel=0.05)
         assert np.allclose(np.linalg.norm(lump.normals, axis=1), 1)
         assert lump.colors == pytest.approx(0.5)

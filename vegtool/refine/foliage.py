@@ -248,9 +248,9 @@ def unbiased(leaves: Leaves, corners: Callable[[float], FloatArray]) -> float:
 
     corners: of the triangles, (k, 3, 3), at a scale.
     """
-    wanted = rays_met(leaves.rays, leaves.found)
+    wanted = np.count_nonzero(rays_met(leaves.rays, leaves.found))
     scale = 1.0
     for _ in range(ROUNDS):
-        found = rays_met(leaves.rays, hits(leaves.rays, corners(scale)))
+        found = np.count_nonzero(rays_met(leaves.rays, hits(leaves.rays, corners(scale))))
         scale *= (wanted + FEW) / (found + FEW)
     return scale

@@ -33,15 +33,23 @@ class Rays:
     views: FloatArray
 
     @staticmethod
-    def around(corners: FloatArray, directions: int = DIRECTIONS, cells: int = CELLS) -> Rays:
-        """For triangles (f, 3, 3), whose bounds are not a point."""
+    def around(
+        corners: FloatArray,
+        directions: int = DIRECTIONS,
+        cells: int = CELLS,
+        room: float = ROOM,
+        half: bool = False,
+    ) -> Rays:
+        """For triangles (f, 3, 3), whose bounds are not a point. room: of their extent, that a grid
+        shows. half: from above only, as does for outlines, which are the same from behind."""
         low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
         nth = np.arange(directions)
-        up = 1 - (2 * nth + 1) / directions
+        part = (nth + 0.5) / directions
+        up = part if half else 1 - 2 * part
         turn = np.pi * nth * (5**0.5 - 1)
         across = np.sqrt(1 - up * up)
         views = np.stack([across * np.cos(turn), up, across * np.sin(turn)], axis=1)
-        return Rays((low + high) / 2, ROOM * float(np.linalg.norm(high - low)), cells, views)
+        return Rays((low + high) / 2, room * float(np.linalg.norm(high - low)), cells, views)
 
     @property
     def cell(self) -> float:
@@ -105,11 +113,12 @@ def _of_view(rays: Rays, corners: FloatArray, index: int) -> Hits:
     return Hits(ray, face, np.stack([second, third], axis=1), depth, twice[face] > 0)
 
 
-def rays_met(rays: Rays, found: Hits) -> int:
-    """How many rays meet anything."""
-    met = np.zeros(len(rays.views) * rays.cells**2, dtype=bool)
-    met[found.ray] = True
-    return int(np.count_nonzero(met))
+def rays_met(rays: Rays, found: Hits) -> npt.NDArray[np.bool_]:
+    """(d * cells * cells,) which rays meet anything. Their number times `cell` is what is covered,
+    in the mean over the directions."""
+    result = np.zeros(len(rays.views) * rays.cells**2, dtype=bool)
+    result[found.ray] = True
+    return result
 
 
 def distinct(ray: Ints, label: Ints, count: int) -> FloatArray:

@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from vegtool.arrays import FloatArray, unit
+from vegtool.refine.hits import Rays, hits, rays_met
 from vegtool.refine.wood_lines import Ints
-from vegtool.refine.wood_shadow import Shadows
 
 LEAST = 12
 """Triangles: with fewer, nothing is left of a shape."""
@@ -26,6 +26,8 @@ BULK = 20_000
 """Triangles: more are collapsed to so many first, once for all."""
 SWELLING = 1.3
 """The most that a lump is swollen or shrunk by."""
+CELLS, ROOM = 128, 1.2
+"""Of the grids on which lumps are compared: with less room, what swells is cut off."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,15 +65,15 @@ def lumps(surface: Surface) -> tuple[float, tuple[Lump, ...]]:
     if len(faces) > BULK:
         positions, faces = collapsed(positions, faces, BULK)
     corners = surface.positions[surface.faces]
-    shadows = Shadows.around(corners)
-    truth = shadows.of(corners)
+    rays = Rays.around(corners, cells=CELLS, room=ROOM, half=True)
+    truth = rays_met(rays, hits(rays, corners))
     target = float(min(MOST, len(faces)))
     while target >= LEAST:
         left, triangles = collapsed(positions, faces, int(target))
         if len(triangles) and (not found or len(triangles) < len(found[-1].faces)):
-            found.append(_lump(surface, left, triangles, shadows, truth))
+            found.append(_lump(surface, left, triangles, rays, truth))
         target = min(target, float(len(triangles))) / RATIO
-    return float(truth.sum() * shadows.cell), tuple(found)
+    return float(truth.sum() * rays.cell), tuple(found)
 
 
 def collapsed(positions: FloatArray, faces: Ints, target: int) -> tuple[FloatArray, Ints]:
@@ -89,25 +91,25 @@ def _lump(
     surface: Surface,
     positions: FloatArray,
     faces: Ints,
-    shadows: Shadows,
+    rays: Rays,
     truth: npt.NDArray[np.bool_],
 ) -> Lump:
     """The lump of a surface with its edges collapsed."""
     from scipy.spatial import cKDTree
 
     foot = surface.axis[cKDTree(surface.axis).query(positions)[1]]
-    swell, made = 1.0, shadows.of(positions[faces])
+    swell, made = 1.0, rays_met(rays, hits(rays, positions[faces]))
     for _ in range(2):
         if made.any():
             swell = float(np.clip(swell * truth.sum() / made.sum(), 1 / SWELLING, SWELLING))
         swollen = foot + (positions - foot) * swell
-        made = shadows.of(swollen[faces])
+        made = rays_met(rays, hits(rays, swollen[faces]))
     return Lump(
         swollen,
         _normals(swollen, faces),
         _colors(surface, positions),
         faces,
-        float((made != truth).sum() * shadows.cell),
+        float((made != truth).sum() * rays.cell),
     )
 
 
