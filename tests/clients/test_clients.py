@@ -89,7 +89,7 @@ def vegtool(*arguments: str | Path) -> str:
         [sys.executable, "-m", "vegtool.cli", *map(str, arguments)],
         capture_output=True,
         text=True,
-        timeout=600,
+        timeout=3600,
     )
     assert done.returncode == 0, done.stderr
     return done.stdout
