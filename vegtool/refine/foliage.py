@@ -22,11 +22,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from vegtool.arrays import FloatArray, IntArray, checked, unit
+from vegtool.arrays import FloatArray, IntArray, unit
 from vegtool.plant import Plant
 from vegtool.refine.cutouts import cutouts
 from vegtool.refine.foliage_groups import grouped, mean_of
 from vegtool.refine.hits import Hits, Rays, distinct, hits, nearest, rays_met
+from vegtool.refine.mesh import ColoredMesh
 
 Ints = npt.NDArray[np.int64]
 
@@ -70,31 +71,11 @@ class Leaves:
 
 
 @dataclass(frozen=True, eq=False)
-class Foliage:
-    """A mesh of leaves, v vertices and t triangles, to be drawn from both sides.
+class Foliage(ColoredMesh):
+    """A mesh of leaves. scale: how many times as large a triangle is as what its leaves cover
+    together, for all to cover what all leaves do."""
 
-    positions: (v, 3) metres. normals: (v, 3) unit. colors: (v, 3) linear. faces: (t, 3) int32.
-    scale: how many times as large a triangle is as what its leaves cover together, for all to
-    cover what all leaves do.
-    """
-
-    positions: FloatArray
-    normals: FloatArray
-    colors: FloatArray
-    faces: IntArray
     scale: float
-
-    def __post_init__(self) -> None:
-        positions = checked("Foliage.positions", self.positions, (None, 3), np.float64)
-        n = len(positions)
-        values = {
-            "positions": positions,
-            "normals": checked("Foliage.normals", self.normals, (n, 3), np.float64),
-            "colors": checked("Foliage.colors", self.colors, (n, 3), np.float64),
-            "faces": checked("Foliage.faces", self.faces, (None, 3), np.int32, n),
-        }
-        for name, value in values.items():
-            object.__setattr__(self, name, value)
 
 
 def leaves_of(plant: Plant, faces: IntArray) -> Leaves | None:

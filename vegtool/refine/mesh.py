@@ -3,25 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
+from dataclasses import dataclass
 
 import numpy as np
 
-from vegtool.arrays import FloatArray, IntArray
+from vegtool.arrays import FloatArray, IntArray, checked
 from vegtool.plant import Material, Plant
 
 
-class ColoredMesh(Protocol):
-    """positions (v, 3) metres, normals (v, 3) unit, colors (v, 3) linear, faces (t, 3) int32."""
+@dataclass(frozen=True, eq=False)
+class ColoredMesh:
+    """A mesh of v vertices and t triangles, to be drawn from both sides.
 
-    @property
-    def positions(self) -> FloatArray: ...
-    @property
-    def normals(self) -> FloatArray: ...
-    @property
-    def colors(self) -> FloatArray: ...
-    @property
-    def faces(self) -> IntArray: ...
+    positions: (v, 3) metres. normals: (v, 3) unit. colors: (v, 3) linear. faces: (t, 3) int32.
+    """
+
+    positions: FloatArray
+    normals: FloatArray
+    colors: FloatArray
+    faces: IntArray
+
+    def __post_init__(self) -> None:
+        name, n = type(self).__name__, len(self.positions)
+        for field in ("positions", "normals", "colors"):
+            value = checked(f"{name}.{field}", getattr(self, field), (n, 3), np.float64)
+            object.__setattr__(self, field, value)
+        faces = checked(f"{name}.faces", self.faces, (None, 3), np.int32, n)
+        object.__setattr__(self, "faces", faces)
 
 
 def joined(parts: Sequence[ColoredMesh | None], name: str = "mesh") -> Plant | None:

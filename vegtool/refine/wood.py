@@ -23,7 +23,7 @@ from math import sqrt
 
 import numpy as np
 
-from vegtool.arrays import FloatArray, IntArray, checked
+from vegtool.refine.mesh import ColoredMesh
 from vegtool.refine.wood_choice import Choice, Screen
 from vegtool.refine.wood_mesh import mesh_of
 from vegtool.refine.wood_stems import Stems, stems_of
@@ -45,34 +45,16 @@ CLOSE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Wood:
-    """A mesh of wood, v vertices and t triangles, to be drawn from both sides.
+class Wood(ColoredMesh):
+    """A mesh of wood, its triangles counter-clockwise from outside.
 
-    positions: (v, 3) metres. normals: (v, 3) unit. colors: (v, 3) linear. faces: (t, 3) int32,
-    counter-clockwise from outside. stems: how many there are. drawn: how many of them are drawn,
-    for themselves or for others too. wrong_m2: square metres drawn wrongly, by estimate, in the
-    mean over all views.
+    stems: how many there are. drawn: how many of them are drawn, for themselves or for others too.
+    wrong_m2: square metres drawn wrongly, by estimate, in the mean over all views.
     """
 
-    positions: FloatArray
-    normals: FloatArray
-    colors: FloatArray
-    faces: IntArray
     stems: int
     drawn: int
     wrong_m2: float
-
-    def __post_init__(self) -> None:
-        positions = checked("Wood.positions", self.positions, (None, 3), np.float64)
-        n = len(positions)
-        values = {
-            "positions": positions,
-            "normals": checked("Wood.normals", self.normals, (n, 3), np.float64),
-            "colors": checked("Wood.colors", self.colors, (n, 3), np.float64),
-            "faces": checked("Wood.faces", self.faces, (None, 3), np.int32, n),
-        }
-        for name, value in values.items():
-            object.__setattr__(self, name, value)
 
 
 def reduced_wood(stems: Stems, triangles: int, pixel_m: float) -> Wood | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vegtool.arrays import FloatArray, unit
-from vegtool.refine.wood_choice import SECTIONS, Choice, Section
+from vegtool.refine.wood_choice import SECTIONS, Bools, Choice, Section
 from vegtool.refine.wood_lines import Ints, ends, taper_areas
 from vegtool.refine.wood_stems import Stems
 
@@ -106,7 +106,7 @@ def straightened(stems: Stems, choice: Choice) -> Tapers:
     return Tapers(at, girth * choice.wider[stem], color, stem, stems.facing[stem])
 
 
-def joined(stems: Stems, node: Ints, shown: np.ndarray) -> FloatArray:
+def joined(stems: Stems, node: Ints, shown: Bools) -> FloatArray:
     """(n, 3) the stems' nodes, starts moved on to the straight lines, between the nodes that are
     left, of the stems that they grow from, where those are drawn."""
     at = stems.node.copy()
@@ -158,7 +158,7 @@ def swept(tapers: Tapers, section: Section) -> Mesh:
     )
 
 
-def tangents(at: FloatArray, inner: np.ndarray) -> FloatArray:
+def tangents(at: FloatArray, inner: Bools) -> FloatArray:
     """(m, 3) unit vectors along lines, halfway between the steps before and after each node."""
     step = unit(np.diff(at, axis=0)) * inner[:, None]
     none = np.zeros((1, 3))
