@@ -87,6 +87,12 @@ def of_wood(corners: npt.ArrayLike) -> Plant:
     return replace(plant_of(corners), materials=(Material("bark", role="wood"),))
 
 
+def one_sided() -> Plant:
+    """Leaves that need quads for both sides, and wood that stands in the file twice with them."""
+    plant = bush()
+    return replace(plant, materials=tuple(replace(m, double_sided=False) for m in plant.materials))
+
+
 PLANTS: dict[str, Callable[[], Plant]] = {
     "bare": lambda: with_faces(bush(), is_wood(bush())),
     "no wood": lambda: with_faces(bush(), ~is_wood(bush())),
@@ -107,6 +113,7 @@ PLANTS: dict[str, Callable[[], Plant]] = {
     "a thousand kilometres": lambda: scaled(np.full(3, 1e6)),
     "leaves that nobody sees": lambda: painted("leaf", [1.0, 1.0, 1.0, 0.0]),
     "black wood": lambda: painted("wood", [0.0, 0.0, 0.0, 1.0]),
+    "seen from one side": one_sided,
     "a soup": lambda: soup(3000),
 }
 

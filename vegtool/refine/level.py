@@ -138,37 +138,53 @@ def on_planes(
 ) -> Level:
     """Wood as it is given, the rest on billboards of so many triangles."""
     plant = source.plant
-    density = source.truth_at.display.pixels_per_metre(wanted.near_m)
     by_mesh: npt.NDArray[np.bool_] = np.zeros(len(plant.faces), dtype=bool)
     by_mesh[source.wood] = wood is not None
+    level, labels = baked(source, wanted, wood, triangles, by_mesh, seconds, progress)
+    if level.triangles > wanted.triangles and not level.double_sided:
+        # all of it stands in the file twice, once for each side
+        once = wanted.triangles // 2 - (wanted.triangles - triangles)
+        level, labels = baked(source, wanted, wood, once, by_mesh, seconds, progress)
+    progress("coverage", 0.6)
+    with timed(seconds, "coverage"):
+        truths = [source.truth_at(metres) for metres in (wanted.near_m, wanted.far_m)]
+        level = solve_coverage(level, truths, BakeOptions().gutter, reach=REACH).level
+    progress("color", 0.7)
+    with timed(seconds, "color"):
+        level = unbiased_color(level, source.truth_at(wanted.near_m))
+    with timed(seconds, "error"):
+        error = geometric_error(plant, labels, level.billboards, level.mesh, by_mesh)
+    return replace(level, geometric_error_m=error)
+
+
+def baked(
+    source: Source,
+    wanted: Wanted,
+    wood: Wood | None,
+    triangles: int,
+    by_mesh: npt.NDArray[np.bool_],
+    seconds: dict[str, float],
+    progress: Progress,
+) -> tuple[Level, IntArray]:
+    """A level whose alpha is the mean coverage of each texel, and the (f,) clusters of all faces;
+    -1 of those that the mesh shows, (f,) bool."""
+    density = source.truth_at.display.pixels_per_metre(wanted.near_m)
     with timed(seconds, "planes"):
         shown = np.flatnonzero(~by_mesh).astype(np.int32)
         count = max(triangles // PER_BILLBOARD, 1)
-        labels, billboards = planes(plant, shown, count, 1 / density, seed=wanted.seed)
+        labels, billboards = planes(source.plant, shown, count, 1 / density, seed=wanted.seed)
         labels = np.where(by_mesh, -1, labels).astype(np.int32)
-    how = BakeOptions(max_texture=wanted.max_texture, fit_alpha=False)
     level = bake(
         source.buffers,
         labels,
         billboards,
         density,
-        how,
+        BakeOptions(max_texture=wanted.max_texture, fit_alpha=False),
         lambda stage, fraction: progress(stage, 0.3 + 0.3 * fraction),
         white=wood is not None,
     )
     mesh = joined([wood], "wood")
-    if mesh is not None:
-        level = replace(level, kind="hybrid", mesh=mesh)
-    progress("coverage", 0.6)
-    with timed(seconds, "coverage"):
-        truths = [source.truth_at(metres) for metres in (wanted.near_m, wanted.far_m)]
-        level = solve_coverage(level, truths, how.gutter, reach=REACH).level
-    progress("color", 0.7)
-    with timed(seconds, "color"):
-        level = unbiased_color(level, source.truth_at(wanted.near_m))
-    with timed(seconds, "error"):
-        error = geometric_error(plant, labels, billboards, mesh, by_mesh)
-    return replace(level, geometric_error_m=error)
+    return (level if mesh is None else replace(level, kind="hybrid", mesh=mesh)), labels
 
 
 def leaf_pixels(source: Source, triangles: int, pixel_m: float) -> float:
