@@ -24,9 +24,9 @@ from vegtool.srgb import linear_from_srgb, srgb_from_linear
 
 BRIGHTER = 1.01
 """Than the truth, in linear light. Clients that average the samples of a pixel as encoded, as a
-stock three.js does, show edges too dark, and a level is edges more than its plant: by 2 % on average
-of five plants, which leaves them as much too dark as those that average light show it too bright.
-"""
+stock three.js does, show edges too dark, and a level is edges more than its plant: by 2 % on
+average of five plants, which leaves them as much too dark as those that average light show it too
+bright."""
 LEAST_GAIN, MOST_GAIN = 0.5, 2.0
 """Farther off, it is not colour that is wrong."""
 
