@@ -15,9 +15,7 @@ from vegtool.measure.pictures import client_plant, live
 from vegtool.measure.views import Camera
 
 
-def drawn(
-    level: Level, cameras: Sequence[Camera], lights: Sequence[Light], anisotropy: int = 1
-) -> tuple[Picture, ...]:
+def drawn(level: Level, cameras: Sequence[Camera], lights: Sequence[Light]) -> tuple[Picture, ...]:
     """The level from each camera under the light of the same index, as `measure.pictures.live`
     draws it; linear, premultiplied by coverage.
 
@@ -26,6 +24,6 @@ def drawn(
     """
     with PlantBuffers(client_plant(level), mipmaps=True) as buffers:
         return tuple(
-            live(buffers, camera, light, anisotropy)
+            live(buffers, camera, light, anisotropy=1)
             for camera, light in zip(cameras, lights, strict=True)
         )
