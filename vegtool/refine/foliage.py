@@ -116,14 +116,14 @@ def leaves_of(plant: Plant, faces: IntArray) -> Leaves | None:
 
 
 def reduced_leaves(
-    leaves: Leaves, triangles: int, pixel_m: float, factor: float = 1.0, seed: int = 0
+    leaves: Leaves, triangles: int, pixel_m: float, factor: float = 1.0
 ) -> Foliage | None:
     """The leaves as at most that many triangles; None for none.
 
     pixel_m: metres that a pixel covers, where the level is seen from nearest. factor: how many
     times the area that is expected to cover as much as the leaves do, seen from all sides. The
-    triangles suit the leaves, not where they stand. Nothing is random, and the seed changes
-    nothing. Raises ValueError where a length or factor is not positive.
+    triangles suit the leaves, not where they stand. Nothing is random. Raises
+    ValueError where a length or factor is not positive.
     """
     for name, value in (("pixel_m", pixel_m), ("factor", factor)):
         if not (np.isfinite(value) and value > 0):

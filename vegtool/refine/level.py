@@ -200,7 +200,7 @@ def as_triangles(source: Source, wanted: Wanted, wood: Wood | None, triangles: i
     """Wood as it is given, leaves as so many triangles."""
     assert source.leaves is not None
     pixel_m = 1 / source.truth_at.display.pixels_per_metre(wanted.near_m)
-    leaves = reduced_leaves(source.leaves, triangles, pixel_m, seed=wanted.seed)
+    leaves = reduced_leaves(source.leaves, triangles, pixel_m)
     mesh = joined([wood, leaves], source.plant.name)
     assert mesh is not None
     none = np.full(len(source.plant.faces), -1, dtype=np.int32)
