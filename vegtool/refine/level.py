@@ -87,6 +87,16 @@ class Wanted:
         return rounded_up(REACH * self.near_m)
 
 
+@dataclass(frozen=True, eq=False)
+class Made:
+    """A level, and what shows which of the f faces: labels (f,) int32 clusters on billboards, -1 of
+    none; by_mesh (f,) bool."""
+
+    level: Level
+    labels: IntArray
+    by_mesh: npt.NDArray[np.bool_]
+
+
 def source_of(buffers: PlantBuffers, truth_at: TruthsAt) -> Source:
     """What is known of a plant before its first level."""
     plant = buffers.plant
@@ -110,12 +120,22 @@ def refined_level(source: Source, wanted: Wanted, progress: Progress = silent) -
         wood = wood_of(source, wanted, pixel_m)
     left = wanted.triangles - (0 if wood is None else len(wood.faces))
     progress("planes", 0.1)
-    level = on_planes(source, wanted, wood, left, seconds, progress)
+    made = on_planes(source, wanted, wood, left, seconds, progress)
     if leaf_pixels(source, left, pixel_m) <= SMALL:
         progress("foliage", 0.8)
         with timed(seconds, "foliage"):
-            level = better(source, wanted, level, as_triangles(source, wanted, wood, left))
-    return replace(level, near_distance_m=wanted.near_m, seconds={**seconds, **level.seconds})
+            made = better(source, wanted, made, as_triangles(source, wanted, wood, left))
+    level = made.level
+    with timed(seconds, "error"):
+        error = geometric_error(
+            source.plant, made.labels, level.billboards, level.mesh, made.by_mesh
+        )
+    return replace(
+        level,
+        near_distance_m=wanted.near_m,
+        geometric_error_m=error,
+        seconds={**seconds, **level.seconds},
+    )
 
 
 def wood_of(source: Source, wanted: Wanted, pixel_m: float) -> Wood | None:
@@ -135,7 +155,7 @@ def on_planes(
     triangles: int,
     seconds: dict[str, float],
     progress: Progress,
-) -> Level:
+) -> Made:
     """Wood as it is given, the rest on billboards of so many triangles."""
     plant = source.plant
     by_mesh: npt.NDArray[np.bool_] = np.zeros(len(plant.faces), dtype=bool)
@@ -152,9 +172,7 @@ def on_planes(
     progress("color", 0.7)
     with timed(seconds, "color"):
         level = unbiased_color(level, source.truth_at(wanted.near_m))
-    with timed(seconds, "error"):
-        error = geometric_error(plant, labels, level.billboards, level.mesh, by_mesh)
-    return replace(level, geometric_error_m=error)
+    return Made(level, labels, by_mesh)
 
 
 def baked(
@@ -196,7 +214,7 @@ def leaf_pixels(source: Source, triangles: int, pixel_m: float) -> float:
     return float(np.sqrt(covered / triangles)) / pixel_m
 
 
-def as_triangles(source: Source, wanted: Wanted, wood: Wood | None, triangles: int) -> Level:
+def as_triangles(source: Source, wanted: Wanted, wood: Wood | None, triangles: int) -> Made:
     """Wood as it is given, leaves as so many triangles."""
     assert source.leaves is not None
     pixel_m = 1 / source.truth_at.display.pixels_per_metre(wanted.near_m)
@@ -204,13 +222,12 @@ def as_triangles(source: Source, wanted: Wanted, wood: Wood | None, triangles: i
     mesh = joined([wood, leaves], source.plant.name)
     assert mesh is not None
     none = np.full(len(source.plant.faces), -1, dtype=np.int32)
-    error = geometric_error(source.plant, none, None, mesh, none < 0)
-    level = Level("mesh", mesh=mesh, geometric_error_m=error)
-    return unbiased_color(level, source.truth_at(wanted.near_m))
+    level = unbiased_color(Level("mesh", mesh=mesh), source.truth_at(wanted.near_m))
+    return Made(level, none, none < 0)
 
 
-def better(source: Source, wanted: Wanted, one: Level, other: Level) -> Level:
+def better(source: Source, wanted: Wanted, one: Made, other: Made) -> Made:
     """Of two levels that which errs less (FLIP) at the nearest distance; the first of equals."""
     truth = source.truth_at(wanted.near_m)
-    errs = [float(scores(truth, level).values["flip"].mean()) for level in (one, other)]
+    errs = [float(scores(truth, made.level).values["flip"].mean()) for made in (one, other)]
     return other if errs[1] < errs[0] else one
