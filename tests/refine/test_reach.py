@@ -33,7 +33,7 @@ def level(truth_at: TruthsAt) -> Level:
     near_m = distance_of(truth_at.plant, Display(), 100.0)
     with PlantBuffers(truth_at.plant) as buffers:
         source = source_of(buffers, truth_at)
-        made = on_planes(source, Wanted(80, near_m), None, 80, {}, lambda *_: None)
+        made = on_planes(source, Wanted(80, near_m), None, 80, {}, lambda *_: None).level
     return replace(made, near_distance_m=near_m)
 
 
