@@ -33,8 +33,8 @@ from vegtool.baselines.crossed import crossed
 from vegtool.boxes import fit_budget
 from vegtool.clustering import cluster
 from vegtool.formats import read_plant
-from vegtool.gl.draw import Light
 from vegtool.growth import sample
+from vegtool.lighting.light import Light
 from vegtool.lod import Level
 from vegtool.measure.background import bytes_over
 from vegtool.measure.pictures import client_plant, live, truth

@@ -11,9 +11,9 @@ import pytest
 from vegtool.convert import ConvertOptions, billboard_counts, convert, near_pixels
 from vegtool.errors import UsageError
 from vegtool.formats.gltf import level_glb
-from vegtool.gl.draw import Light
 from vegtool.gl.upload import PlantBuffers
 from vegtool.growth import sample
+from vegtool.lighting.light import Light
 from vegtool.lod import LodChain
 from vegtool.measure.options import MeasureOptions
 from vegtool.measure.pictures import client_plant, live, truth

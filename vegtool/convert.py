@@ -10,6 +10,7 @@ faces. From where it may be used is measured then (measure/chain.py).
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass, fields, replace
 from functools import partial
 from math import log
@@ -20,6 +21,9 @@ from vegtool.baking.options import BakeOptions
 from vegtool.boxes.options import BoxOptions, Shape
 from vegtool.clustering import METHODS, ClusterOptions
 from vegtool.errors import UsageError
+from vegtool.lighting.crown import crown_normals
+from vegtool.lighting.leaves import translucent
+from vegtool.lighting.light import Sun
 from vegtool.lod import Display, Level, LodChain
 from vegtool.measure.options import MeasureOptions
 from vegtool.measure.views import distance_of
@@ -30,6 +34,7 @@ from vegtool.timing import timed
 
 if TYPE_CHECKING:
     from vegtool.baking.bake import PlantBuffers
+    from vegtool.gl.pictures import BakedLight
     from vegtool.measure.scores import TruthsAt
 
 LEVEL_RATIO = 2
@@ -113,10 +118,33 @@ class ConvertOptions:
         "Billboards per cluster of --refine none: by the box's form, one, or crossed.",
         choices=get_args(Shape),
     )
+    prelit: bool = option(
+        False,
+        "Levels with the light of one sun in their colours, its shadows too, and without normal "
+        "textures; needs --sun.",
+    )
+    sun: str | None = option(
+        None,
+        "Where the sun of --prelit stands: azimuth from +z towards +x, and elevation, in degrees.",
+        metavar="AZ,EL",
+    )
     occlusion: float = option(
         0.0,
-        "Ambient occlusion put into colours, the original's too: how much darker is what the plant "
-        "itself hides from all sides. 1 is all of it, 0 none.",
+        "How much less of the sky's light reaches what the plant itself hides from it: 1 is all of "
+        "it, 0 none; written as occlusion textures. With --prelit it is 1.",
+        least=0.0,
+        most=1.0,
+    )
+    translucency: float | None = option(
+        None,
+        "Share of light that leaves let through, in their own colour [as the file says, or none].",
+        least=0.0,
+        most=1.0,
+    )
+    crown_normals: float = option(
+        0.0,
+        "How far the normals of leaves are bent towards those of the crown as a whole, in the "
+        "levels alone: 1 is all the way.",
         least=0.0,
         most=1.0,
     )
@@ -141,6 +169,22 @@ class ConvertOptions:
         for item in (item for item in fields(self) if item.name in PLAIN):
             if self.refine != "none" and getattr(self, item.name) != item.default:
                 raise UsageError(f"{flag_of(item)}: is the plain method's; add --refine none")
+        if self.sun is not None:
+            if not self.prelit:
+                raise UsageError("--sun: is where the light of --prelit comes from; add --prelit")
+            Sun.read(self.sun)
+
+    @property
+    def baked_sun(self) -> Sun | None:
+        """The sun whose light goes into colours. Raises UsageError where it is not said."""
+        if not self.prelit:
+            return None
+        if self.sun is None:
+            raise UsageError(
+                "--prelit: expected where the sun stands; add --sun AZ,EL, in degrees, such as "
+                "--sun 135,40"
+            )
+        return Sun.read(self.sun)
 
     @property
     def display(self) -> Display:
@@ -162,23 +206,31 @@ def convert(
     where no level keeps to `measure.max_error`, CapabilityError where nothing can draw.
     """
     from vegtool.baking.bake import PlantBuffers
+    from vegtool.gl.sun import SunMaps
     from vegtool.measure.chain import views_of, with_distances
     from vegtool.measure.distances import rounded_up
-    from vegtool.measure.scores import TruthsAt
+    from vegtool.measure.scores import Shadowed, TruthsAt
 
     options, measure = options or ConvertOptions(), measure or MeasureOptions()
     check_limits(options)
     check_limits(measure)
-    if options.occlusion:
-        from vegtool.refine.occlusion import occluded
-
-        plant = occluded(plant, options.occlusion)
+    sun = options.baked_sun
+    plant = as_lit(plant, options)
     making = 1.0 if measure.measure == "off" else MAKING
     levels = [Level("mesh", mesh=plant, geometric_error_m=(0.0, 0.0))]
     counts = billboard_counts(plant, options)
-    with PlantBuffers(plant) as buffers:
-        truth_at = TruthsAt(plant, views_of(measure), options.display, buffers)
-        make = level_maker(buffers, truth_at, options)
+    with ExitStack() as stack:
+        buffers = stack.enter_context(PlantBuffers(plant))
+        under = None
+        if sun is not None:
+            maps = stack.enter_context(SunMaps([buffers], sun.direction))
+            under = Shadowed(sun.light, maps)
+        truth_at = TruthsAt(plant, views_of(measure), options.display, buffers, under)
+        baked_from = buffers
+        if options.crown_normals:
+            crowned = crown_normals(plant, options.crown_normals)
+            baked_from = stack.enter_context(PlantBuffers(crowned))
+        make = level_maker(baked_from, truth_at, options)
         size = options.pixels or near_pixels(counts[0])
         near, farthest = (
             rounded_up(distance_of(plant, options.display, pixels))
@@ -209,7 +261,27 @@ def convert(
             notes = (*notes, *coverage_notes(kept, truth_at))
     progress("levels", 1.0)
     told = {**asdict(options), **asdict(measure)}
-    return LodChain(plant.name, (levels[0], *kept), options.display, options.seed, told, notes)
+    levels = [levels[0], *kept]
+    if sun is None:
+        return LodChain(plant.name, tuple(levels), options.display, options.seed, told, notes)
+    if sun.elevation_deg < 0:
+        below = "the sun is below the horizon: the levels' colours have the sky's light alone"
+        notes = (*notes, below)
+    return LodChain(
+        plant.name, tuple(levels), options.display, options.seed, told, notes, sun.as_dict()
+    )
+
+
+def as_lit(plant: Plant, options: ConvertOptions) -> Plant:
+    """The plant with what the options say of light: its exposure, and what leaves let through."""
+    if options.translucency is not None:
+        plant = translucent(plant, options.translucency)
+    strength = options.occlusion or float(options.prelit)
+    if strength:
+        from vegtool.refine.occlusion import exposed
+
+        plant = exposed(plant, strength)
+    return plant
 
 
 LevelMaker = Callable[[int, float, Progress], Level]
@@ -220,13 +292,18 @@ so many metres on."""
 def level_maker(buffers: PlantBuffers, truth_at: TruthsAt, options: ConvertOptions) -> LevelMaker:
     """What makes the levels of a plant, by `options.refine`; all that they share is made here.
 
-    buffers: the plant's, without mipmaps. truth_at: what it looks like.
+    buffers: the plant's, without mipmaps. truth_at: what it looks like, under the light that is
+    baked where one is.
     """
+    from vegtool.gl.pictures import BakedLight
+
+    under = truth_at.under
+    lit = None if under is None else BakedLight(under.light, under.shadows)
     if options.refine == "none":
-        return partial(billboard_level, buffers, options)
+        return partial(billboard_level, buffers, options, lit)
     from vegtool.refine.level import Wanted, refined_level, source_of
 
-    source = source_of(buffers, truth_at)
+    source = source_of(buffers, truth_at, lit)
 
     def make(count: int, near_m: float, progress: Progress) -> Level:
         most = TRIANGLES_PER_BILLBOARD * count
@@ -239,11 +316,15 @@ def level_maker(buffers: PlantBuffers, truth_at: TruthsAt, options: ConvertOptio
 def billboard_level(
     buffers: PlantBuffers,
     options: ConvertOptions,
+    lit: BakedLight | None,
     count: int,
     near_m: float,
     progress: Progress = silent,
 ) -> Level:
-    """One level of at most `count` billboards, its atlas made for a distance of `near_m` metres."""
+    """One level of at most `count` billboards, its atlas made for a distance of `near_m` metres.
+
+    lit: light that goes into its colours.
+    """
     from vegtool.baking.bake import bake
     from vegtool.boxes import fit_budget, geometric_error
     from vegtool.clustering import cluster
@@ -271,6 +352,7 @@ def billboard_level(
         options.display.pixels_per_metre(near_m),
         BakeOptions(max_texture=options.max_texture),
         lambda stage, fraction: progress(stage, 0.4 + 0.6 * fraction),
+        lit=lit,
     )
     return replace(
         baked,

@@ -87,7 +87,8 @@ class Atlas:
     covered: in each picture (baking/coverage.py), or seen from all sides (refine/coverage.py).
     Colour is carried on where nothing is covered.
     normal: (h, w, 3) uint8, tangent space of the billboard (x along u, y along v); blue is above
-    one half but where the source's own shading normals point away from the side that is seen.
+    one half but where the source's own shading normals point away from the side that is seen. None
+    where light is in the colours.
     depth: (h, w) uint16, signed depth along the side's own normal over the billboard's half_depth:
     32768 is the plane, 65535 half_depth towards the viewer, 1 half_depth behind, 0 nothing.
     front, back: (p, 4) int32 texels x0, y0, width, height (y down from the top row), gutter not
@@ -96,14 +97,20 @@ class Atlas:
     back equals front where one picture serves both sides.
     white: (4,) int32 texels, as front: a block of opaque white with a flat normal, for a mesh in
     the same draw call to show all over; or None.
+    light: (h, w, 4) uint8, linear, what `Material.light_texture` holds: how much of the sky's light
+    reaches the side that the picture shows (red) and the other side (green), and how much light
+    passes through (alpha), in the colour times transmission_tint, (3,); blue is 0. Or None where
+    all does and none passes.
     """
 
     color: ByteArray
-    normal: ByteArray
+    normal: ByteArray | None
     depth: np.ndarray
     front: IntArray
     back: IntArray
     white: IntArray | None = None
+    light: ByteArray | None = None
+    transmission_tint: FloatArray = field(default_factory=lambda: np.ones(3))
 
     def __post_init__(self) -> None:
         color = checked("Atlas.color", self.color, (None, None, 4), np.uint8)
@@ -111,13 +118,18 @@ class Atlas:
         front = checked("Atlas.front", self.front, (None, 4), np.int32)
         values = {
             "color": color,
-            "normal": checked("Atlas.normal", self.normal, (height, width, 3), np.uint8),
             "depth": checked("Atlas.depth", self.depth, (height, width), np.uint16),
             "front": front,
             "back": checked("Atlas.back", self.back, (len(front), 4), np.int32),
         }
+        tint = checked("Atlas.transmission_tint", self.transmission_tint, (3,), np.float64)
+        values["transmission_tint"] = tint
+        if self.normal is not None:
+            values["normal"] = checked("Atlas.normal", self.normal, (height, width, 3), np.uint8)
         if self.white is not None:
             values["white"] = checked("Atlas.white", self.white, (4,), np.int32)
+        if self.light is not None:
+            values["light"] = checked("Atlas.light", self.light, (height, width, 4), np.uint8)
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
@@ -125,6 +137,11 @@ class Atlas:
     def texels(self) -> int:
         """Texels of one channel set: width times height."""
         return int(self.color.shape[0] * self.color.shape[1])
+
+    @property
+    def images(self) -> int:
+        """How many images a client loads: colour, and normals and light where there are any."""
+        return 1 + (self.normal is not None) + (self.light is not None)
 
 
 @dataclass(frozen=True)
@@ -167,6 +184,7 @@ class Level:
     texels_per_metre: density of the atlas. near_distance_m: from here on the level may be used.
     geometric_error_m: (maximum, 95th percentile) of DESIGN section 7, or None if not computed.
     measured: its errors at near_distance_m, or None where they were not measured.
+    unlit: light is in the colours already, of one sun and its shadows; clients add none.
     seconds: how long each stage of making it took.
     """
 
@@ -179,6 +197,7 @@ class Level:
     near_distance_m: float = 0.0
     geometric_error_m: tuple[float, float] | None = None
     measured: Measured | None = None
+    unlit: bool = False
     seconds: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -219,11 +238,14 @@ class Level:
 
     @property
     def texels(self) -> int:
-        """Texels of all the level's textures (colour and normal counted each)."""
+        """Texels of all the level's textures (colour, normal and light counted each)."""
         if self.atlas is not None:
-            return 2 * self.atlas.texels
+            return self.atlas.images * self.atlas.texels
         assert self.mesh is not None
-        images = [t for m in self.mesh.materials for t in (m.color_texture, m.normal_texture) if t]
+        textures = [
+            (m.color_texture, m.normal_texture, m.light_texture) for m in self.mesh.materials
+        ]
+        images = [texture for three in textures for texture in three if texture]
         unique = {id(t): t.pixels.shape[0] * t.pixels.shape[1] for t in images}
         return int(sum(unique.values()))
 
@@ -234,6 +256,8 @@ class LodChain:
 
     options: everything that shaped the result, as plain values, for the manifest.
     notes: sentences for the user: levels that were left out, and why.
+    baked: the light in the levels' colours, as plain values for the manifest; empty where clients
+    light them.
     """
 
     name: str
@@ -242,6 +266,7 @@ class LodChain:
     seed: int
     options: dict[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    baked: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

@@ -47,6 +47,11 @@ class Material:
     alpha_mode: "mask" discards where alpha < alpha_cutoff; "opaque" ignores alpha. (A file's BLEND
     is read as mask: leaves are cut out, not glass.)
     role: wood or leaf, which branches, hybrids and lighting ask.
+    transmission: share, 0 to 1, of the light on one side that leaves by the other, scattered, as
+    through a leaf; its colour is the surface's own times transmission_tint, (3,) linear.
+    unlit: colours are what is seen, whatever light there is, as where light is baked into them.
+    light_texture: what is baked of light beside colour: red and green times `Plant.exposure`, alpha
+    times transmission; or None for white.
     """
 
     name: str
@@ -60,10 +65,26 @@ class Material:
     metallic: float = 0.0
     roughness: float = 0.9
     role: Role = "wood"
+    transmission: float = 0.0
+    transmission_tint: FloatArray = field(default_factory=lambda: np.ones(3))
+    unlit: bool = False
+    light_texture: Texture | None = None
 
     def __post_init__(self) -> None:
         factor = checked(f"Material {self.name}: base_color", self.base_color, (4,), np.float64)
         object.__setattr__(self, "base_color", factor)
+        what = f"Material {self.name}: transmission_tint"
+        object.__setattr__(
+            self, "transmission_tint", checked(what, self.transmission_tint, (3,), np.float64)
+        )
+        if not 0 <= self.transmission <= 1:
+            raise ValueError(f"Material {self.name}: transmission must lie in 0..1")
+
+    @property
+    def textures(self) -> tuple[Texture, ...]:
+        """Those that it has."""
+        three = self.color_texture, self.normal_texture, self.light_texture
+        return tuple(texture for texture in three if texture is not None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +134,8 @@ class Plant:
     positions: (v, 3) float64 metres, y up. normals: (v, 3) float64 unit vectors.
     uvs: (v, 2) float64, glTF's convention: (0, 0) is the texture's top left corner.
     colors: (v, 4) float64 linear factors, or None.
+    exposure: (v, 2) float64, 0 to 1, how much of the sky's light the plant itself lets through to
+    the vertex, from the side of its normal and from the other side; or None for all of it.
     faces: (f, 3) int32 vertex indices, counter-clockwise from outside.
     face_material: (f,) int32 index into materials.
     branches: what the file itself says of its branches, or None.
@@ -128,6 +151,7 @@ class Plant:
     face_material: IntArray
     materials: tuple[Material, ...]
     colors: FloatArray | None = None
+    exposure: FloatArray | None = None
     branches: Branches | None = None
     notes: tuple[str, ...] = ()
     source: str = ""
@@ -146,6 +170,9 @@ class Plant:
         if self.colors is not None:
             colors = checked("Plant.colors", self.colors, (count, 4), np.float64)
             object.__setattr__(self, "colors", colors)
+        if self.exposure is not None:
+            exposure = checked("Plant.exposure", self.exposure, (count, 2), np.float64)
+            object.__setattr__(self, "exposure", exposure)
         if self.branches is not None and len(self.branches.face_branch) != len(faces):
             raise ValueError("Plant.branches: one branch per face expected")
         for name, value in (

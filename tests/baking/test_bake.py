@@ -345,7 +345,7 @@ def test_the_middle_of_a_white_block_is_white_in_the_first_mip_too(x, y):
     """Bilinear filtering there takes the four texels around it; all else is black, so that none
     of them may reach beyond the block. Its gutter is not counted on."""
     color, normal = np.zeros((32, 32, 4), np.uint8), np.zeros((32, 32, 3), np.uint8)
-    whiten(color, normal, np.array([8 + x, 12 + y, WHITE, WHITE]), 0)
+    whiten(color, normal, None, np.array([8 + x, 12 + y, WHITE, WHITE]), 0)
     middle = np.array([12 + y, 8 + x]) + WHITE / 2
     for level, image in enumerate([color, next(iter(mip_levels(color, True)))]):
         low = middle / 2**level - 0.5

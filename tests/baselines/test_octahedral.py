@@ -6,8 +6,8 @@ from baselines.baseline_cases import plant_from, sphere
 
 from vegtool.arrays import unit
 from vegtool.baselines.octahedral import FRAMES, Octahedral, directions, nearest
-from vegtool.gl.draw import Light
 from vegtool.gl.upload import PlantBuffers
+from vegtool.lighting.light import Light
 from vegtool.lod import Display
 from vegtool.measure.pictures import client_plant, live, truth
 from vegtool.measure.views import View, around, upright

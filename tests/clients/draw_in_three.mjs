@@ -1,12 +1,13 @@
 // three.js in headless Chromium: draws .glb files by given cameras, under a sun and a sky alone.
-// stdin: {light: {sun, above, below}, jobs: [{file, views: [{eye, target, up, fov, full: [w, h],
-//         crop: [x, y, w, h], near, far, sun: [x, y, z], out}, ...]}, ...]}
+// stdin: {light: {sun, above, below}, jobs: [{file, stock, views: [{eye, target, up, fov,
+//         full: [w, h], crop: [x, y, w, h], near, far, sun: [x, y, z], out}, ...]}, ...]}
 //   light: strengths as factors of the albedo. sun: towards it. fov: degrees, of the full image,
 //   of which a crop is drawn; pixels, from the upper left.
 // stdout: one JSON object per line and job, {file, complaints}. The picture of a view is written to
 //   the file `out`: RGBA as half floats, lowest row first, linear and premultiplied.
-// Materials keep their textures, factors, cutoff and sides, and become Lambert's. Pictures are
-// multisampled (4x) in half-float linear light, as three's own effect composer draws them.
+// Materials keep their textures, factors, cutoff and sides, and become Lambert's; where `stock` is
+// true they stay as three's own loader makes them. Pictures are multisampled (4x) in half-float
+// linear light, as three's own effect composer draws them.
 import fs from 'node:fs';
 import {inBrowser} from './browser.mjs';
 import {readInput} from './packages.mjs';
@@ -34,7 +35,7 @@ function lambert(old) {
     {map, normalMap, normalScale, alphaTest, side, color, vertexColors});
 }
 
-window.open3 = async (url) => {
+window.open3 = async (url, stock) => {
   scene?.traverse((node) => {
     if (!node.isMesh) return;
     node.geometry.dispose();
@@ -42,7 +43,9 @@ window.open3 = async (url) => {
     node.material.dispose();
   });
   const {scene: model} = await new GLTFLoader().loadAsync(url);
-  model.traverse((node) => { if (node.isMesh) node.material = lambert(node.material); });
+  model.traverse((node) => {
+    if (node.isMesh && !stock) node.material = lambert(node.material);
+  });
   scene = new THREE.Scene();
   scene.add(model, sun, sky);
 };
@@ -75,9 +78,9 @@ window.ready = true;
 
 const files = jobs.map((job) => job.file);
 await inBrowser(script, files, async (tab, complaints) => {
-  for (const [index, {file, views}] of jobs.entries()) {
+  for (const [index, {file, stock, views}] of jobs.entries()) {
     complaints.length = 0;
-    await tab.evaluate((url) => window.open3(url), `/file/${index}`);
+    await tab.evaluate((url, own) => window.open3(url, own), `/file/${index}`, stock ?? false);
     for (const view of views) {
       const pixels = await tab.evaluate((v) => window.shoot(v), view);
       fs.writeFileSync(view.out, Buffer.from(pixels, 'base64'));

@@ -25,9 +25,9 @@ from vegtool.arrays import Picture
 from vegtool.convert import ConvertOptions, convert
 from vegtool.formats import read_plant
 from vegtool.formats.gltf import level_glb, plant_glb
-from vegtool.gl.draw import Light
 from vegtool.gl.upload import PlantBuffers, vertex_data
 from vegtool.growth import sample
+from vegtool.lighting.light import Light
 from vegtool.lod import Display
 from vegtool.measure.metrics import reference, score
 from vegtool.measure.options import MeasureOptions

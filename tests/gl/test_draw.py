@@ -10,11 +10,12 @@ from vegtool.errors import CapabilityError
 from vegtool.gl import targets
 from vegtool.gl.context import context, framebuffer_kept
 from vegtool.gl.count import count_fragments
-from vegtool.gl.draw import MSAA, Light, Shot, begin, draw, render
+from vegtool.gl.draw import MSAA, Shot, begin, draw, render
 from vegtool.gl.targets import drawing_target
 from vegtool.gl.timing import time_frames
 from vegtool.gl.upload import PlantBuffers
 from vegtool.growth import sample
+from vegtool.lighting.light import Light
 from vegtool.lod import Display
 from vegtool.measure.views import Camera, around, direction
 from vegtool.plant import Material, Plant

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vegtool.gl.draw import Light, Shot, draw
+from vegtool.gl.draw import Shot, draw
 from vegtool.gl.mipmaps import mip_levels
 from vegtool.gl.upload import PlantBuffers
+from vegtool.lighting.light import Light
 from vegtool.measure.views import Camera, direction
 from vegtool.plant import Material, Plant, Texture
 from vegtool.srgb import linear_from_srgb, srgb_from_linear

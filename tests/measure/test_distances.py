@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from vegtool.lod import FADE_FRACTION
@@ -125,16 +125,22 @@ def test_three_digits_and_never_nearer(metres: float, stated: float) -> None:
     st.lists(st.floats(0, 1), min_size=5, max_size=5),
     st.floats(1e-6, 1e6),
 )
+@example([[0.0, 0, 0, 0, 0], [0.0, 0, 0, 1e-9, 0]], [0.0, 0, 0, 0, 1], 1.0)
 def test_no_level_is_shown_at_a_distance_where_it_was_measured_above_the_limit(
     curves: list[list[float]], limit: list[float], scale: float
 ) -> None:
-    """And distances increase by more than a fade, whatever the curves; and scale with the plant."""
+    """And distances increase by more than a fade, whatever the curves; and scale with the plant.
+
+    To within rounding. A distance less than a billionth above three digits is stated as those. The
+    line of an error minus its limit falls by 2 at most while distance doubles, by 2.9e-9 there.
+    Whether a * 1.15 <= b or a <= b / 1.15 may differ by a float's last bit.
+    """
     metres = scale * METRES
     found = switch_distances(metres, [np.array(c) for c in curves], np.array(limit))
     kept = [(d, np.array(c)) for d, c in zip(found, curves, strict=True) if isinstance(d, float)]
     starts = [start for start, _ in kept]
-    assert all((1 + FADE_FRACTION) * a <= b for a, b in pairwise(starts))
+    assert all((1 + FADE_FRACTION) * a <= b * (1 + 1e-15) for a, b in pairwise(starts))
     ends = [*((1 + FADE_FRACTION) * start for start in starts[1:]), metres[-1]]
     for (start, curve), end in zip(kept, ends, strict=False):
         shown = (metres >= start) & (metres <= end)
-        assert (curve[shown] <= np.array(limit)[shown] + 1e-12).all()
+        assert (curve[shown] <= np.array(limit)[shown] + 3e-9).all()

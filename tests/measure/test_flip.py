@@ -135,7 +135,12 @@ def test_moves_with_what_is_pictured() -> None:
     a, b = (np.pad(p, ((15, 15), (15, 15), (0, 0)), "constant", constant_values=0.3)
             for p in pictures("smooth", 20, 24))  # fmt: skip
     moved = flip(*(np.roll(p, (3, 5), axis=(0, 1)) for p in (a, b)))
-    np.testing.assert_allclose(moved[3:, 5:], flip(a, b)[:-3, :-5], rtol=0, atol=TOLERANCE)
+    found, expected = moved[3:, 5:], flip(a, b)[:-3, :-5]
+    differ = expected > 0.01
+    np.testing.assert_allclose(found[differ], expected[differ], rtol=0, atol=TOLERANCE)
+    # Around them the pictures differ by next to nothing, which is rounded as a product orders its
+    # sums, and that depends on the place in a block and on the processor.
+    np.testing.assert_allclose(found, expected, rtol=0, atol=NEAR_NOTHING)
 
 
 def test_pairs_in_threads_get_the_bytes_they_get_alone() -> None:

@@ -15,9 +15,9 @@ from PIL import Image
 from vegtool.convert import ConvertOptions, convert
 from vegtool.formats import read_plant
 from vegtool.formats.gltf import level_glb
-from vegtool.gl.draw import Light
 from vegtool.gl.upload import PlantBuffers
 from vegtool.growth import sample
+from vegtool.lighting.light import Light
 from vegtool.lod import Atlas, Billboards, Display, Level
 from vegtool.measure.background import bytes_over
 from vegtool.measure.contact_sheet import contact_sheet

@@ -7,6 +7,7 @@ the alpha test (coverage.py).
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import sqrt
 
 import numpy as np
@@ -19,7 +20,7 @@ from vegtool.baking.pack import Packing, pack
 from vegtool.baking.sides import compare_sides, opposite_needed, pictures_of, turned
 from vegtool.errors import UsageError
 from vegtool.gl.context import describe
-from vegtool.gl.pictures import Drawn, draw_pictures
+from vegtool.gl.pictures import BakedLight, Drawn, draw_pictures
 from vegtool.gl.upload import PlantBuffers as PlantBuffers  # for those who bake several levels
 from vegtool.lod import Atlas, Billboards, Level
 from vegtool.plant import Plant
@@ -34,6 +35,8 @@ WHITE = 4
 """Texels: side of a white block. In the middle of four, mips 0 and 1 are white wherever it lies."""
 FLAT = (128, 128, 255)
 """A normal that points straight out."""
+ALL_OF_THE_SKY = (255, 255, 0, 0)
+"""What `Atlas.light` says of wood that is drawn as a mesh."""
 
 
 def bake(
@@ -44,13 +47,16 @@ def bake(
     options: BakeOptions | None = None,
     progress: Progress = silent,
     white: bool = False,
+    lit: BakedLight | None = None,
 ) -> Level:
     """Bake the faces of each cluster into the pictures of the billboards that show it.
 
     plant: give PlantBuffers to bake several levels from one upload. labels: (f,) int32 cluster of
     each face, matching `billboards.cluster`; faces of clusters that no billboard shows, and those
     of cluster -1, are left out. white: give the atlas a white block, for a mesh beside the
-    billboards (Atlas.white). The level's billboards are those given, some turned round (u and the
+    billboards (Atlas.white). lit: light that goes into the colours, in place of normals; without,
+    the atlas has the plant's exposure and the light that its leaves let through, where it knows of
+    them (Atlas.light). The level's billboards are those given, some turned round (u and the
     normal), so that the side which shows more is in front; its density is lower than asked for
     where max_texture forbids that. From where it may be used, and its errors, are for others to
     say. Raises UsageError where the pictures cannot fit into max_texture at any density, and
@@ -59,13 +65,15 @@ def bake(
     options = options or BakeOptions()
     if isinstance(plant, Plant):
         with PlantBuffers(plant) as buffers:
-            return bake(buffers, labels, billboards, texels_per_metre, options, progress, white)
+            return bake(
+                buffers, labels, billboards, texels_per_metre, options, progress, white, lit
+            )
     seconds: dict[str, float] = {}
     progress("bake", 0.0)
     with timed(seconds, "pairs"):
         face, shown_by = pairs(labels, billboards.cluster)
     with timed(seconds, "sides"):
-        sides = compare_sides(plant, billboards, face, shown_by)
+        sides = compare_sides(plant, billboards, face, shown_by, lit)
         billboards, sides = turned(billboards, sides)
         double_sided = options.sides == "double" or (
             options.sides == "auto" and not opposite_needed(billboards, sides)
@@ -90,6 +98,8 @@ def bake(
         np.concatenate([shown_by, back_picture]),
         (packing.width, packing.height),
         samples,
+        None if lit is None else replace(lit, both_sides=double_sided),
+        light=lit is None and has_light(plant.plant),
     )
     seconds |= drawn.seconds
     progress("bake", 0.8)
@@ -97,11 +107,12 @@ def bake(
         front = packing.rect[: len(billboards)]
         back = front.copy()
         back[behind] = packing.rect[len(billboards) : len(which)]
-        color, normal = dilated(drawn, packing, options.fit_alpha)
+        color, normal, light = dilated(drawn, packing, options.fit_alpha)
         block = packing.rect[-1] if white else None
         if block is not None:
-            whiten(color, normal, block, options.gutter)
-        atlas = Atlas(color, normal, drawn.depth, front, back, block)
+            whiten(color, normal, light, block, options.gutter)
+        tint = transmission_tint(plant.plant)
+        atlas = Atlas(color, normal, drawn.depth, front, back, block, light, tint)
     progress("bake", 1.0)
     return Level(
         "billboards",
@@ -109,6 +120,7 @@ def bake(
         atlas=atlas,
         double_sided=double_sided,
         texels_per_metre=density,
+        unlit=lit is not None,
         seconds=seconds,
     )
 
@@ -172,20 +184,51 @@ def supersample(packing: Packing, options: BakeOptions) -> int:
     return max(options.supersample, min(MOST_SAMPLES, cheap))
 
 
-def dilated(drawn: Drawn, packing: Packing, fit_alpha: bool = True) -> tuple[ByteArray, ByteArray]:
-    """Colour and normals carried under alpha 0; alpha such that what is covered passes the test, or
-    as drawn."""
+def dilated(
+    drawn: Drawn, packing: Packing, fit_alpha: bool = True
+) -> tuple[ByteArray, ByteArray | None, ByteArray | None]:
+    """Colour, normals and light carried under alpha 0; alpha such that what is covered passes the
+    test, or as drawn."""
     covered = drawn.color[..., 3] > 0
     nearest = nearest_covered(covered, packing.rect, packing.gutter)
     color = drawn.color.reshape(-1, 4)[nearest]
     alpha = drawn.color[..., 3]
     color[..., 3] = coverage_kept(alpha, packing.rect, packing.gutter) if fit_alpha else alpha
-    return color, drawn.normal.reshape(-1, 3)[nearest]
+    normal = None if drawn.normal is None else drawn.normal.reshape(-1, 3)[nearest]
+    light = None if drawn.light is None else drawn.light.reshape(-1, 4)[nearest]
+    return color, normal, light
 
 
-def whiten(color: ByteArray, normal: ByteArray, block: IntArray, gutter: int) -> None:
-    """Paint a block (4,) of an atlas, and its gutter, opaque white and facing straight out."""
+def whiten(
+    color: ByteArray,
+    normal: ByteArray | None,
+    light: ByteArray | None,
+    block: IntArray,
+    gutter: int,
+) -> None:
+    """Paint a block (4,) of an atlas, and its gutter, opaque white and facing straight out, with
+    all of the sky's light and none that passes through."""
     x, y, w, h = block.tolist()
     painted = np.s_[y - gutter : y + h + gutter, x - gutter : x + w + gutter]
     color[painted] = 255
-    normal[painted] = FLAT
+    if normal is not None:
+        normal[painted] = FLAT
+    if light is not None:
+        light[painted] = ALL_OF_THE_SKY
+
+
+def has_light(plant: Plant) -> bool:
+    """Whether there is more to light than colours and normals say."""
+    return plant.exposure is not None or any(m.transmission > 0 for m in plant.materials)
+
+
+def transmission_tint(plant: Plant) -> FloatArray:
+    """(3,) of all light that passes through a plant's leaves, by how much passes and how large they
+    are; white where none does."""
+    area = np.bincount(plant.face_material, plant.face_areas, len(plant.materials))
+    weight = area * np.array([m.transmission for m in plant.materials])
+    if not weight.sum() > 0:
+        return np.ones(3)
+    return np.asarray(
+        weight @ np.array([m.transmission_tint for m in plant.materials]) / weight.sum()
+    )

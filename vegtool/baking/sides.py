@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vegtool.arrays import ByteArray, FloatArray, IntArray
-from vegtool.gl.pictures import Pictures, draw_pictures
+from vegtool.gl.pictures import BakedLight, Pictures, draw_pictures
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Billboards
 
@@ -59,11 +59,17 @@ class Sides:
 
 
 def compare_sides(
-    buffers: PlantBuffers, billboards: Billboards, face: IntArray, shown_by: IntArray
+    buffers: PlantBuffers,
+    billboards: Billboards,
+    face: IntArray,
+    shown_by: IntArray,
+    lit: BakedLight | None = None,
 ) -> Sides:
     """Draw front and back of every billboard small and compare them.
 
-    face, shown_by: (m,) int32, the faces and which billboard shows each, as in draw_pictures.
+    face, shown_by: (m,) int32, the faces and which billboard shows each, as in draw_pictures. lit:
+    light that goes into colours; it differs from side to side, and is left out of the comparison,
+    as one picture shows the mean of both.
     """
     count = len(billboards)
     cell = np.arange(2 * count)
@@ -77,6 +83,7 @@ def compare_sides(
         np.concatenate([shown_by, shown_by + count]),
         (CELLS_PER_ROW * CELL, rows * CELL),
         SAMPLES,
+        None if lit is None else replace(lit, both_sides=True),
     )
 
     def texels_of(image: ByteArray) -> FloatArray:
@@ -84,7 +91,6 @@ def compare_sides(
         return np.asarray(cells.reshape(len(cells) * CELLS_PER_ROW, CELL * CELL, -1)[: 2 * count])
 
     texels = texels_of(drawn.color) / 255.0
-    leaning = texels_of(drawn.normal)[..., :2] / 127.5 - 1.0
     alpha = texels[..., 3]
     front, back = alpha[:count], alpha[count:]
     either = np.maximum(front, back).sum(axis=1)
@@ -96,8 +102,18 @@ def compare_sides(
         back.mean(axis=1),
         np.abs(front - back).sum(axis=1) / np.maximum(either, 1e-9),
         np.where((total[:count] > 0) & (total[count:] > 0), color, 0.0),
-        np.einsum("ptc,ptc,pt->p", leaning[:count], leaning[count:], front * back) >= 0,
+        _mirrored(None if drawn.normal is None else texels_of(drawn.normal), front * back),
     )
+
+
+def _mirrored(normal: FloatArray | None, both: FloatArray) -> np.ndarray:
+    """(p,) bool: `Sides.mirrored`, from the texels of both sides' normals, (2p, t, 3), and how much
+    both cover of each, (p, t); always, where there are no normals to lean."""
+    count = len(both)
+    if normal is None:
+        return np.ones(count, dtype=bool)
+    leaning = normal[..., :2] / 127.5 - 1.0
+    return np.asarray(np.einsum("ptc,ptc,pt->p", leaning[:count], leaning[count:], both) >= 0)
 
 
 def turned(billboards: Billboards, sides: Sides) -> tuple[Billboards, Sides]:

@@ -105,7 +105,7 @@ class Octahedral:
         )
         seconds = dict(drawn.seconds)
         with timed(seconds, "dilate"):
-            color, normal = dilated(drawn, packing)
+            color, normal, _ = dilated(drawn, packing)
         atlas = Atlas(color, normal, drawn.depth, packing.rect, packing.rect)
         return Level(
             "billboards", billboards=quad, atlas=atlas, texels_per_metre=density, seconds=seconds

@@ -1,6 +1,7 @@
 """Writing glTF 2.0: a plant, one level, or a whole chain of levels as .glb files.
 
-Sources: glTF 2.0 specification; MSFT_lod (vendor extension, Khronos glTF repository).
+Sources: glTF 2.0 specification; KHR_materials_unlit, KHR_materials_diffuse_transmission, MSFT_lod
+(extensions, Khronos glTF repository). A client that knows none of them still draws the file.
 
 A file holds positions as float32, so a plant far from its origin (map coordinates) would lose
 what its leaves are made of. Its vertices are then written relative to the plant's centre, and the
@@ -29,6 +30,9 @@ ALPHA_CUTOFF = 0.5  # of a billboard: what baking/coverage.py fits its alpha to
 ROUGHNESS = 0.9  # of a billboard: foliage seen from afar has no highlight of its own
 FAR_FROM_ORIGIN = 16.0  # plant radii: float32 rounds by 2^-24 of it, a millionth of a radius
 
+RAMP_SIZE = 16  # texels: halves evenly into mip levels, and 15 steps of 17 make 255
+UNLIT, TRANSMISSION = "KHR_materials_unlit", "KHR_materials_diffuse_transmission"
+
 _SHORT_INDICES = 65535  # vertices; index 65535 itself is reserved for primitive restart
 _LINEAR, _LINEAR_MIPMAP_LINEAR = 9729, 9987
 _REPEAT, _CLAMP_TO_EDGE = 10497, 33071
@@ -37,11 +41,24 @@ EncodedImages = dict[int, tuple[bytes, str]]
 """File bytes and MIME type of images already encoded, by the id of their texture or pixels."""
 
 
+def _ramp() -> npt.NDArray[np.uint8]:
+    """(RAMP_SIZE, RAMP_SIZE, 4): red grows along u, green and alpha along v, each from 0 to 255."""
+    step = np.round(np.linspace(0, 255, RAMP_SIZE)).astype(np.uint8)
+    v, u = np.meshgrid(step, step, indexing="ij")
+    return np.stack([u, v, np.zeros_like(u), v], axis=2)
+
+
+RAMP = _ramp()
+"""A texture that shows its own coordinates, so that what vertices hold (Plant.exposure) can stand
+where glTF knows textures alone: as occlusion."""
+
+
 def plant_glb(plant: Plant) -> bytes:
     """A plant as a .glb file: one node, one mesh, one primitive per material that has faces.
 
     Where the plant knows its branches, vertices carry the attributes _BRANCH and _BRANCH_PARENT
-    (indices of branches, -1 for no parent), which vegtool reads back.
+    (indices of branches, -1 for no parent), which vegtool reads back. Where it knows its exposure,
+    TEXCOORD_1 lays that on a RAMP, whose red is the materials' occlusion.
     """
     writer = _Writer(_local_origin(plant.bounds), {})
     writer.document.show(writer.add_plant(plant, plant.name, plant.branches))
@@ -91,12 +108,14 @@ def write_chain(
     depth: bool = False,
     extra: Mapping[str, bytes] | None = None,
     inputs: Iterable[Path] = (),
+    packed: bool = False,
 ) -> list[Path]:
     """Write NAME_LOD1.glb, ..., NAME.glb (all levels), NAME.lod.json and `extra`: all or none.
 
     depth: also NAME_LOD1_depth.png, ...: 16 bit grey, as Atlas.depth.
     extra: bytes of further files by name, which appear with the others.
     inputs: files that the chain was made from; nothing in their folders is overwritten.
+    packed: also NAME_LOD1_leaf.png, ..., of levels with Atlas.light: RGBA, as that.
     Returns the paths of the files. Raises OutputError as FileSet does.
     """
     images: EncodedImages = {}
@@ -106,11 +125,14 @@ def write_chain(
             name = level_name(chain, index)
             data = level_glb(level, name, images)
             files.add(f"{name}.glb", data)
-            depth_name = None
+            depth_name = leaf_name = None
             if depth and level.atlas is not None:
                 depth_name = f"{name}_depth.png"
                 files.add(depth_name, png.encode(level.atlas.depth))
-            levels.append(LevelFile(f"{name}.glb", len(data), depth_name))
+            if packed and level.atlas is not None and level.atlas.light is not None:
+                leaf_name = f"{name}_leaf.png"
+                files.add(leaf_name, png.encode(level.atlas.light))
+            levels.append(LevelFile(f"{name}.glb", len(data), depth_name, leaf_name))
         data = chain_glb(chain, images)
         combined = LevelFile(f"{chain.name}.glb", len(data))
         files.add(combined.name, data)
@@ -121,11 +143,15 @@ def write_chain(
         return files.paths
 
 
-def file_names(name: str, levels: int, depth: bool = False) -> list[str]:
-    """The files that `write_chain` writes for a chain of that many levels, the original counted."""
+def file_names(name: str, levels: int, depth: bool = False, packed: bool = False) -> list[str]:
+    """The files that `write_chain` may write for a chain of that many levels, the original counted.
+
+    Images beside them (depth, packed) are written of the levels that have them.
+    """
     lower = [f"{name}_LOD{index}" for index in range(1, levels)]
-    depths = [f"{each}_depth.png" for each in lower] if depth else []
-    return [*(f"{each}.glb" for each in lower), *depths, f"{name}.glb", f"{name}.lod.json"]
+    endings = [".glb", *(["_depth.png"] if depth else []), *(["_leaf.png"] if packed else [])]
+    beside = [f"{each}{ending}" for ending in endings for each in lower]
+    return [*beside, f"{name}.glb", f"{name}.lod.json"]
 
 
 def level_name(chain: LodChain, index: int) -> str:
@@ -173,14 +199,16 @@ class _Writer:
     def add_atlas_level(self, level: Level, name: str) -> int:
         """Add a level of billboards, with or without a mesh beside them; return its node."""
         drawn = level_triangles(level)
+        assert level.atlas is not None
         attributes = {
             "POSITION": self._add_positions(drawn.positions),
             "NORMAL": self._add_floats(_unit_normals(drawn.normals)),
-            "TANGENT": self._add_floats(drawn.tangents),
-            "TEXCOORD_0": self._add_floats(drawn.uvs),
         }
+        if level.atlas.normal is not None:
+            attributes["TANGENT"] = self._add_floats(drawn.tangents)
+        attributes["TEXCOORD_0"] = self._add_floats(drawn.uvs)
         if drawn.colors is not None:
-            attributes["COLOR_0"] = self._add_colors(drawn.colors)
+            attributes["COLOR_0"] = self._add_shares(drawn.colors)
         primitive = {
             "attributes": attributes,
             "indices": self._add_indices(drawn.indices, len(drawn.positions)),
@@ -217,18 +245,21 @@ class _Writer:
         }
         if frames is not None:
             attributes["TANGENT"] = self._add_floats(frames)
+        exposed = plant.exposure is not None and not material.unlit
         textured = material.color_texture is not None or material.normal_texture is not None
-        if textured or plant.uvs.any():
+        if textured or exposed or plant.uvs.any():
             attributes["TEXCOORD_0"] = self._add_floats(plant.uvs[vertices])
+        if plant.exposure is not None and exposed:
+            attributes["TEXCOORD_1"] = self._add_shares(_on_ramp(plant.exposure[vertices]))
         if plant.colors is not None:
-            attributes["COLOR_0"] = self._add_colors(plant.colors[vertices])
+            attributes["COLOR_0"] = self._add_shares(plant.colors[vertices])
         if branches is not None and owner is not None:
             attributes["_BRANCH"] = self._add_floats(owner)
             attributes["_BRANCH_PARENT"] = self._add_floats(branches.parent[owner])
         return {
             "attributes": attributes,
             "indices": self._add_indices(faces.ravel(), len(vertices)),
-            "material": self._add_material(material),
+            "material": self._add_material(material, exposed),
         }
 
     def _add_positions(self, positions: FloatArray) -> int:
@@ -238,18 +269,20 @@ class _Writer:
     def _add_floats(self, values: FloatArray | IntArray) -> int:
         return self.document.add_accessor(values.astype(np.float32))
 
-    def _add_colors(self, colors: FloatArray) -> int:
-        """Linear factors in 16 bits: 8 would round dark bark by a tenth."""
-        shorts = np.round(np.clip(colors, 0.0, 1.0) * 65535).astype(np.uint16)
+    def _add_shares(self, values: FloatArray) -> int:
+        """Values of 0 to 1 in 16 bits: 8 would round the colour of dark bark by a tenth."""
+        shorts = np.round(np.clip(values, 0.0, 1.0) * 65535).astype(np.uint16)
         return self.document.add_accessor(shorts, normalized=True)
 
     def _add_indices(self, indices: IntArray, vertices: int) -> int:
         dtype = np.uint16 if vertices <= _SHORT_INDICES else np.uint32
         return self.document.add_accessor(indices.astype(dtype), ELEMENT_ARRAY_BUFFER)
 
-    def _add_material(self, material: Material) -> int:
+    def _add_material(self, material: Material, exposed: bool) -> int:
+        """exposed: whether TEXCOORD_1 lays the exposure of vertices on the RAMP."""
+        color = np.clip(material.base_color, 0.0, 1.0)
         surface: dict[str, Any] = {
-            "baseColorFactor": np.clip(material.base_color, 0.0, 1.0).tolist(),
+            "baseColorFactor": color.tolist(),
             "metallicFactor": min(max(material.metallic, 0.0), 1.0),
             "roughnessFactor": min(max(material.roughness, 0.0), 1.0),
         }
@@ -261,26 +294,53 @@ class _Writer:
             properties["normalTexture"] = {"index": index, "scale": material.normal_scale}
         if material.alpha_mode == "mask":
             properties |= {"alphaMode": "MASK", "alphaCutoff": material.alpha_cutoff}
+        if exposed:
+            ramp = self._add_pixels(RAMP, "exposure_ramp")
+            properties["occlusionTexture"] = {"index": ramp, "texCoord": 1}
+        if material.unlit:
+            properties |= self._extension(UNLIT)
+        elif material.transmission > 0:
+            tint = color[:3] * material.transmission_tint
+            through = _through(material.transmission, tint, surface.get("baseColorTexture"))
+            properties |= self._extension(TRANSMISSION, through)
         return self.document.add("materials", **properties, doubleSided=material.double_sided)
 
     def _add_atlas_material(self, level: Level, name: str) -> int:
         atlas = level.atlas
         assert atlas is not None
-        color = self._add_pixels(atlas.color, f"{name}_color")
-        normal = self._add_pixels(atlas.normal, f"{name}_normal")
-        return self.document.add(
-            "materials",
-            name=name,
-            pbrMetallicRoughness={
-                "baseColorTexture": {"index": color},
+        color = {"index": self._add_pixels(atlas.color, f"{name}_color")}
+        properties: dict[str, Any] = {
+            "name": name,
+            "pbrMetallicRoughness": {
+                "baseColorTexture": color,
                 "metallicFactor": 0.0,
                 "roughnessFactor": ROUGHNESS,
             },
-            normalTexture={"index": normal},
+        }
+        if atlas.normal is not None:
+            index = self._add_pixels(atlas.normal, f"{name}_normal")
+            properties["normalTexture"] = {"index": index}
+        if level.unlit:
+            properties |= self._extension(UNLIT)
+        elif atlas.light is not None:
+            light = {"index": self._add_pixels(atlas.light, f"{name}_light")}
+            properties["occlusionTexture"] = light
+            if atlas.light[..., 3].any():
+                through = _through(1.0, atlas.transmission_tint, color)
+                through["diffuseTransmissionTexture"] = light
+                properties |= self._extension(TRANSMISSION, through)
+        return self.document.add(
+            "materials",
+            **properties,
             alphaMode="MASK",
             alphaCutoff=ALPHA_CUTOFF,
             doubleSided=level.double_sided,
         )
+
+    def _extension(self, name: str, values: dict[str, Any] | None = None) -> dict[str, Any]:
+        """The property `extensions` of an object that uses one extension, now listed as used."""
+        self.document.use_extension(name)
+        return {"extensions": {name: values or {}}}
 
     def _add_texture(self, texture: Texture) -> int:
         if id(texture) not in self._images:
@@ -354,6 +414,22 @@ def _split_by_group(faces: IntArray, group: IntArray) -> tuple[IntArray, IntArra
         renumbered.reshape(-1, 3).astype(np.int32),
         owner.astype(np.int32),
     )
+
+
+def _through(share: float, color: FloatArray, texture: dict[str, Any] | None) -> dict[str, Any]:
+    """The extension TRANSMISSION: a share of the light passes through, coloured by `color` (3,)
+    times the texture."""
+    values = {
+        "diffuseTransmissionFactor": share,
+        "diffuseTransmissionColorFactor": np.clip(color, 0.0, 1.0).tolist(),
+    }
+    return values if texture is None else {**values, "diffuseTransmissionColorTexture": texture}
+
+
+def _on_ramp(exposure: FloatArray) -> FloatArray:
+    """(v, 2) texture coordinates at which the RAMP is `exposure`, 0 to 1: between the middles of
+    its outermost texels."""
+    return np.asarray((0.5 + (RAMP_SIZE - 1) * np.clip(exposure, 0.0, 1.0)) / RAMP_SIZE)
 
 
 def _unit_normals(normals: FloatArray) -> FloatArray:

@@ -1,7 +1,8 @@
 """Materials and textures of glTF 2.0.
 
 Sources: glTF 2.0 specification, 3.9; KHR_texture_transform, KHR_texture_basisu, EXT_texture_webp,
-KHR_materials_pbrSpecularGlossiness, KHR_techniques_webgl (its diffuse texture only).
+KHR_materials_pbrSpecularGlossiness, KHR_techniques_webgl (its diffuse texture only),
+KHR_materials_unlit, KHR_materials_diffuse_transmission.
 """
 
 from __future__ import annotations
@@ -17,8 +18,12 @@ from vegtool.formats.alpha import DEFAULT_CUTOFF, settle_alpha
 from vegtool.formats.gltf_data import GltfFile
 from vegtool.formats.images import decode
 from vegtool.plant import Material, Texture
+from vegtool.srgb import linear_from_srgb
 
 REPEAT = 10497
+STRONGEST_TINT = 4.0
+"""Times the surface's own colour: where light that passes through is coloured by another texture,
+a mean beyond says that the two show different things."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +108,12 @@ def _read_material(
         texture,
         notes,
     )
+    unlit = "KHR_materials_unlit" in extensions
+    through = extensions.get("KHR_materials_diffuse_transmission", {})
+    transmission = 0.0 if unlit else _transmission(file, through, name, images, notes)
+    tint = np.ones(3)
+    if transmission:
+        tint = _transmission_tint(file, through, name, base_color, texture, images, notes)
     material = Material(
         name=name,
         base_color=base_color,
@@ -114,8 +125,73 @@ def _read_material(
         double_sided=bool(entry.get("doubleSided", False)),
         metallic=float(metallic),
         roughness=float(roughness),
+        transmission=transmission,
+        transmission_tint=tint,
+        unlit=unlit,
     )
     return ReadMaterial(material, uvs)
+
+
+def _transmission(
+    file: GltfFile,
+    through: dict[str, Any],
+    name: str,
+    images: dict[int, Texture | None],
+    notes: list[str],
+) -> float:
+    """The share of light that passes through, 0 to 1; of a texture of shares, its mean."""
+    share = float(through.get("diffuseTransmissionFactor", 0.0))
+    texture, _ = _texture(file, through.get("diffuseTransmissionTexture"), images, notes)
+    if texture is not None and share > 0:
+        share *= float(texture.pixels[..., 3].mean()) / 255
+        notes.append(
+            f"material {name}: how much light passes through is a texture; its mean, {share:.2g}, "
+            "is taken"
+        )
+    return min(max(share, 0.0), 1.0)
+
+
+def _transmission_tint(
+    file: GltfFile,
+    through: dict[str, Any],
+    name: str,
+    base_color: FloatArray,
+    texture: Texture | None,
+    images: dict[int, Texture | None],
+    notes: list[str],
+) -> FloatArray:
+    """(3,) linear: the colour of light that passes through over the surface's own.
+
+    Exact where both have the same texture or none; else the ratio of their means, which is noted.
+    """
+    factor = np.array(through.get("diffuseTransmissionColorFactor", [1, 1, 1]), dtype=np.float64)
+    factor = np.clip(factor, 0.0, None)
+    other, _ = _texture(file, through.get("diffuseTransmissionColorTexture"), images, notes)
+    own = base_color[:3]
+    if other is texture:
+        return _ratio(factor, own)
+    tint = _ratio(factor * _mean_color(other), own * _mean_color(texture))
+    tint = np.clip(tint, 0.0, STRONGEST_TINT)
+    red, green, blue = tint
+    notes.append(
+        f"material {name}: light that passes through has another texture than the surface; it is "
+        f"coloured as the surface, times ({red:.2g}, {green:.2g}, {blue:.2g}), the ratio of means"
+    )
+    return tint
+
+
+def _ratio(light: FloatArray, own: FloatArray) -> FloatArray:
+    """(3,) light / own; 1 where the surface's own colour is 0, which no tint can change."""
+    return np.divide(light, own, out=np.ones(3), where=own > 0)
+
+
+def _mean_color(texture: Texture | None) -> FloatArray:
+    """(3,) linear mean of all texels; white without a texture."""
+    if texture is None:
+        return np.ones(3)
+    linear = linear_from_srgb(np.arange(256) / 255)
+    channels = texture.pixels[..., :3].reshape(-1, 3).T
+    return np.array([np.bincount(c, minlength=256) @ linear / len(c) for c in channels])
 
 
 def _texture(

@@ -36,11 +36,13 @@ _TYPES: dict[str, tuple[type, ...]] = {
 
 @dataclass(frozen=True)
 class LevelFile:
-    """What was written for a level: file name and size in bytes, and its depth image's name."""
+    """What was written for a level: file name and size in bytes, and the names of the images beside
+    it: depth, and Atlas.light as `leaf`."""
 
     name: str
     bytes: int
     depth: str | None = None
+    leaf: str | None = None
 
 
 def manifest(chain: LodChain, files: Sequence[LevelFile]) -> dict[str, Any]:
@@ -86,7 +88,9 @@ def _level(chain: LodChain, level: Level, file: LevelFile) -> dict[str, Any]:
         "screen_height_fraction": screen_height_fraction(chain, distance) if distance else None,
         "geometric_error_m": None if error is None else {"max": error[0], "p95": error[1]},
         "measured": None if level.measured is None else _measured(level.measured),
+        **({"unlit": True} if level.unlit else {}),
         **({"depth": file.depth} if file.depth else {}),
+        **({"leaf": file.leaf} if file.leaf else {}),
     }
 
 

@@ -37,6 +37,7 @@ class Part:
     positions: (v, 3) float64, may hold NaN. faces: (f, 3) vertex indices, checked to be in range.
     material: index into Parsed.materials. name: of the group, node or mesh, a hint for roles.
     normals: (v, 3), uvs: (v, 2) from the top left corner, colors: (v, 4) linear; None if absent.
+    without_normal: (v,) bool, vertices that the file gives none although it gives others one (OBJ).
     point: (v,) index of the file's own point where a reader had to split points into vertices
     (OBJ), so that missing normals are smooth across the seams.
     branch: (f,) or one int for all: index into Declared.parent, -1 where the file does not say.
@@ -51,6 +52,7 @@ class Part:
     colors: FloatArray | None = None
     point: IndexArray | None = None
     branch: IndexArray | int = -1
+    without_normal: npt.NDArray[np.bool_] | None = None
 
     def __post_init__(self) -> None:
         count = len(self.positions)
@@ -61,6 +63,7 @@ class Part:
             "uvs": (self.uvs, (count, 2)),
             "colors": (self.colors, (count, 4)),
             "point": (self.point, (count,)),
+            "without_normal": (self.without_normal, (count,)),
         }
         for name, (array, shape) in shapes.items():
             if array is not None and array.shape != shape:

@@ -63,7 +63,7 @@ def assemble(parsed: Parsed, path: Path, options: ReadOptions) -> Plant:
     notes = list(parsed.notes)
     mesh = _join(parsed.parts, path)
     mesh = _drop_broken_faces(mesh, path, notes)
-    mesh = _with_normals(mesh, notes)
+    mesh = _with_normals(mesh, _without_normal(parsed.parts), notes)
     mesh = _only_used_vertices(mesh)
     up = options.up if options.up != "auto" else parsed.up
     turn = UPRIGHT[up or guess_up(mesh.positions + mesh.origin, mesh.faces, notes)]
@@ -172,16 +172,38 @@ def _use_any(faces: IndexArray, marked: Mask) -> Mask:
     return np.asarray(marked[faces].any(axis=1))
 
 
-def _with_normals(mesh: _Mesh, notes: list[str]) -> _Mesh:
-    """Every vertex with a unit normal: its own, else the smooth one, else its face's."""
-    own = np.where(np.isfinite(mesh.normals), mesh.normals, 0.0)
+def _without_normal(parts: list[Part]) -> Mask:
+    """(v,) bool: vertices of all parts that the file gives no normal."""
+    return np.concatenate(
+        [
+            np.full(len(part.positions), part.normals is None)
+            if part.without_normal is None
+            else part.without_normal
+            for part in parts
+        ]
+    )
+
+
+def _with_normals(mesh: _Mesh, absent: Mask, notes: list[str]) -> _Mesh:
+    """Every vertex with a unit normal: its own, else the smooth one, else its face's.
+
+    absent: (v,) vertices that the file gives none.
+    """
+    finite = usable_rows(mesh.normals, np.inf)
+    own = np.where(finite[:, None], mesh.normals, 0.0)
     largest = np.abs(own).max(axis=1, keepdims=True)
     own = unit(np.divide(own, largest, out=np.zeros_like(own), where=largest > SHORTEST_NORMAL))
     used = np.zeros(len(own), dtype=bool)
     used[mesh.faces] = True
     missing = used & ~own.any(axis=1)
     if missing.any():
-        notes.append(f"computed the normals of {missing.sum()} of {used.sum()} vertices")
+        kinds = {
+            "without any in the file": missing & absent,
+            "of length zero": missing & finite & ~absent,
+            "not a number": missing & ~finite,
+        }
+        listed = ", ".join(f"{rows.sum()} {kind}" for kind, rows in kinds.items() if rows.any())
+        notes.append(f"computed the normals of {missing.sum()} of {used.sum()} vertices: {listed}")
         own[missing] = smooth_normals(mesh.positions, mesh.faces, mesh.point)[missing]
         cancelled = used & ~own.any(axis=1)  # where two sides of a card share their points
         own[cancelled] = last_face_normals(mesh.positions, mesh.faces)[cancelled]

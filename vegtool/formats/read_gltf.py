@@ -30,6 +30,8 @@ UNDERSTOOD = {
     "EXT_texture_avif",
     "EXT_texture_webp",
     "EXT_mesh_gpu_instancing",
+    "KHR_materials_unlit",
+    "KHR_materials_diffuse_transmission",
 }
 HARMLESS = {
     "MSFT_lod",

@@ -315,6 +315,7 @@ def _part(
         material=index,
         name=" ".join(groups[k] for k in np.unique(group)[:4]),
         normals=taken(normals, normal) if len(normals) else None,
+        without_normal=normal < 0,
         uvs=None if laid is None else laid * [1, -1] + [0, 1],
         colors=tint,
         point=point,

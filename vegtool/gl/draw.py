@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import product
 from weakref import WeakKeyDictionary
 
@@ -13,8 +13,10 @@ import numpy as np
 from vegtool.arrays import FloatArray, Picture
 from vegtool.gl.context import check, framebuffer_kept
 from vegtool.gl.program import program
+from vegtool.gl.sun import SunMaps
 from vegtool.gl.targets import Target, drawing_target, pixel_target, side
 from vegtool.gl.upload import MaterialGroup, PlantBuffers
+from vegtool.lighting.light import Light
 
 MSAA = 4
 """Samples per pixel of a live picture, as engines do by default."""
@@ -33,16 +35,6 @@ class Shot:
     height: int
 
 
-@dataclass(frozen=True, eq=False)
-class Light:
-    """A sun and a sky. direction: (3,) towards the sun. Strengths are factors of the albedo."""
-
-    direction: FloatArray = field(default_factory=lambda: np.array([0.5, 1.0, 0.7]))
-    sun: float = 0.70
-    sky_above: float = 0.38
-    sky_below: float = 0.20
-
-
 def draw(
     buffers: PlantBuffers,
     shot: Shot,
@@ -50,12 +42,14 @@ def draw(
     supersample: int = 1,
     samples: int = 0,
     anisotropy: int = ANISOTROPY,
+    shadows: SunMaps | None = None,
 ) -> Picture:
     """The picture of a plant or level.
 
     supersample: samples per axis and pixel, averaged. samples: of multisampling, 0 for none; alpha
     is tested once per pixel then, as in a client. anisotropy: most taps of a mip-mapped texture; 1
-    is trilinear filtering. Raises CapabilityError where OpenGL cannot multisample so, or cannot
+    is trilinear filtering. shadows: what the sun sees, for shadows to be drawn; light comes from
+    their direction then. Raises CapabilityError where OpenGL cannot multisample so, or cannot
     hold the plant or the picture.
     """
     ctx = buffers.ctx
@@ -63,7 +57,7 @@ def draw(
     with framebuffer_kept(ctx):
         for x, y, part in tiles(ctx, shot, supersample):
             size = (0, 0, part.width, part.height)
-            drawn = draw_tile(buffers, part, light, supersample, samples, anisotropy)
+            drawn = draw_tile(buffers, part, light, supersample, samples, anisotropy, shadows)
             data = drawn.frame.read(size, components=4, dtype="f4")
             pixels = np.frombuffer(data, np.float32).reshape(part.height, part.width, 4)
             picture[y : y + part.height, x : x + part.width] = pixels
@@ -90,6 +84,7 @@ def draw_tile(
     supersample: int,
     samples: int,
     anisotropy: int = ANISOTROPY,
+    shadows: SunMaps | None = None,
 ) -> Target:
     """Draw a picture that a target can hold; what is returned has it in its lower left corner,
     top row first. The caller keeps the framebuffer (`framebuffer_kept`)."""
@@ -97,7 +92,7 @@ def draw_tile(
     size = supersample * shot.width, supersample * shot.height
     drawn = drawing_target(ctx, size, samples)
     begin(drawn, size)
-    render(buffers, shot, light, supersample, anisotropy)
+    render(buffers, shot, light, supersample, anisotropy, shadows)
     return _resolved(ctx, drawn, (shot.width, shot.height), supersample, samples)
 
 
@@ -116,24 +111,59 @@ def render(
     light: Light,
     supersample: int = 1,
     anisotropy: int = ANISOTROPY,
+    shadows: SunMaps | None = None,
 ) -> None:
     """Draw a plant into the framebuffer in use, whose pixels are `supersample` of the shot's."""
-    ctx = buffers.ctx
     matrix = placed(buffers, shot)
-    samples_per_metre = supersample * _pixels_per_metre(shot)
-    sun = tuple(light.direction / np.linalg.norm(light.direction))
-    mips = ("MIPMAPPED", f"ANISOTROPY {anisotropy}.0") if buffers.mipmaps else ()
+    samples_per_metre = supersample * pixels_per_metre(shot)
     for group in buffers.groups:
-        plain = () if group.material.color_texture is not None else ("NO_COLOR_MAP",)
-        mapped = () if group.normal_map is None else ("NORMAL_MAP",)
-        shader = program(ctx, "camera.vert", "camera.frag", *mips, *plain, *mapped)
+        shader = shader_of(buffers, group, "camera.frag", anisotropy, shadows)
         shader["view_projection"] = matrix
-        shader["sun_direction"] = sun
-        shader["sun"] = light.sun
-        shader["sky"] = (light.sky_above, light.sky_below)
+        set_light(shader, buffers, light, shadows)
         buffers.use(group, shader, point_sampled=buffers.minified(group, samples_per_metre))
         render_group(buffers, group, shader)
-    ctx.disable(moderngl.CULL_FACE)
+    buffers.ctx.disable(moderngl.CULL_FACE)
+
+
+def shader_of(
+    buffers: PlantBuffers,
+    group: MaterialGroup,
+    fragment: str,
+    anisotropy: int = ANISOTROPY,
+    shadows: SunMaps | None = None,
+) -> moderngl.Program:
+    """The program of camera.vert and a fragment shader with what a material needs, and no more."""
+    material = group.material
+    defines = {
+        "MIPMAPPED": buffers.mipmaps,
+        f"ANISOTROPY {anisotropy}.0": buffers.mipmaps,
+        "NO_COLOR_MAP": material.color_texture is None,
+        "UNLIT": material.unlit,
+        "NORMAL_MAP": group.normal_map is not None and not material.unlit,
+        "LIGHT_MAP": group.light_map is not None and not material.unlit,
+        "EXPOSURE": buffers.plant.exposure is not None and not material.unlit,
+    }
+    told = [name for name, wanted in defines.items() if wanted]
+    if shadows is not None and not material.unlit:
+        told += shadows.defines
+    return program(buffers.ctx, "camera.vert", fragment, *told)
+
+
+def set_light(
+    shader: moderngl.Program, buffers: PlantBuffers, light: Light, shadows: SunMaps | None = None
+) -> None:
+    """Set the uniforms of shading.glsl and shadow.glsl, as far as a program has them."""
+    direction = light.unit if shadows is None else shadows.direction
+    values = {
+        "sun_direction": tuple(direction),
+        "sun": light.sun,
+        "sky": (light.sky_above, light.sky_below),
+    }
+    for name, value in values.items():
+        if name in shader:
+            shader[name] = value
+    if shadows is not None and "sun_depth" in shader:
+        shadows.use(shader, buffers)
 
 
 def placed(buffers: PlantBuffers, shot: Shot) -> tuple[float, ...]:
@@ -153,8 +183,8 @@ def render_group(buffers: PlantBuffers, group: MaterialGroup, shader: moderngl.P
     buffers.vertex_array(shader).render(vertices=3 * group.count, first=3 * group.first)
 
 
-def _pixels_per_metre(shot: Shot) -> float:
-    """At the target, across the view."""
+def pixels_per_metre(shot: Shot) -> float:
+    """Of a shot, at its target, across the view."""
     row, forward = shot.view_projection[0, :3], shot.view_projection[3, :3]
     across = row - forward * (row @ forward)
     return float(np.linalg.norm(across) * shot.width / 2 / shot.view_projection[3, 3])

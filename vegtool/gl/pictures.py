@@ -16,8 +16,11 @@ import numpy as np
 
 from vegtool.arrays import ByteArray, FloatArray, IntArray
 from vegtool.gl.context import check, describe, framebuffer_kept
+from vegtool.gl.draw import set_light
 from vegtool.gl.program import program
-from vegtool.gl.upload import PlantBuffers
+from vegtool.gl.sun import SunMaps
+from vegtool.gl.upload import MaterialGroup, PlantBuffers
+from vegtool.lighting.light import Light
 
 RGB10_A2 = 0x8059
 CLIP_PLANES = (0x3000, 0x3001, 0x3002, 0x3003)
@@ -46,16 +49,31 @@ class Pictures:
 
 
 @dataclass(frozen=True, eq=False)
-class Drawn:
-    """color (h, w, 4) uint8 sRGB straight, normal (h, w, 3) uint8, depth (h, w) uint16 as in Atlas.
+class BakedLight:
+    """Light that is put into the colours of pictures, in place of their normals.
 
-    Nothing is dilated: colour is black and the normal flat where alpha is 0.
+    shadows: what the sun sees. both_sides: one picture serves both sides of a billboard and shows
+    the mean of their light.
+    """
+
+    light: Light
+    shadows: SunMaps
+    both_sides: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """color (h, w, 4) uint8 sRGB straight, depth (h, w) uint16, normal (h, w, 3) uint8 and light
+    (h, w, 4) uint8 as in Atlas; None where they are not drawn.
+
+    Nothing is dilated: colour and light are black and the normal flat where alpha is 0.
     seconds: by stage: stream (what is drawn, in order), draw, resolve, read.
     """
 
     color: ByteArray
-    normal: ByteArray
     depth: np.ndarray
+    normal: ByteArray | None
+    light: ByteArray | None
     seconds: dict[str, float]
 
 
@@ -66,10 +84,13 @@ def draw_pictures(
     picture: IntArray,
     size: tuple[int, int],
     samples: int,
+    baked: BakedLight | None = None,
+    light: bool = False,
 ) -> Drawn:
     """Draw `face[i]` of the plant into picture `picture[i]`, for all i; (m,) int32 each.
 
-    size: width and height of the atlas in texels. samples: per axis and texel.
+    size: width and height of the atlas in texels. samples: per axis and texel. baked: what light to
+    put into colours; then there are no normals. light: draw what `Atlas.light` holds too.
     Raises CapabilityError where OpenGL cannot hold the plant or the pictures.
     """
     ctx = buffers.ctx
@@ -79,8 +100,9 @@ def draw_pictures(
     columns = min(width, describe(ctx).max_texture // samples)
     rows = int(np.clip(SAMPLE_LIMIT // (columns * samples * samples), 1, height))
     table = _picture_table(buffers, pictures)
-    target = _Samples(ctx, (columns * samples, rows * samples))
-    atlas = _Resolved(ctx, size)
+    channels = _channels(baked is None, light)
+    target = _Samples(ctx, (columns * samples, rows * samples), channels)
+    atlas = _Resolved(ctx, size, channels)
     watch.lap("stream")
     try:
         with framebuffer_kept(ctx):
@@ -88,17 +110,17 @@ def draw_pictures(
                 tile = (x, y, min(columns, width - x), min(rows, height - y))
                 target.use(tile[2] * samples, tile[3] * samples)
                 part = _within(stream, pictures.rect, tile)
-                _draw(buffers, part, table, tile, samples * _density(pictures))
+                _draw(buffers, part, table, tile, samples * _density(pictures), baked, light)
                 watch.lap("draw")
                 atlas.resolve(target, samples, tile)
                 watch.lap("resolve")
-            color, normal, depth = atlas.read()
+            read = atlas.read()
             watch.lap("read")
             check(ctx)
     finally:
         for made in (table, target, atlas):
             made.release()
-    return Drawn(color, normal, depth, watch.seconds)
+    return Drawn(read["color"], read["depth"], read.get("normal"), read.get("light"), watch.seconds)
 
 
 def _density(pictures: Pictures) -> float:
@@ -157,6 +179,8 @@ def _draw(
     table: moderngl.Texture,
     tile: Tile,
     samples_per_metre: float,
+    baked: BakedLight | None,
+    light: bool,
 ) -> None:
     """Draw a tile of the atlas into the framebuffer in use."""
     if not len(stream.face):
@@ -167,7 +191,6 @@ def _draw(
     corners[..., 1] = stream.picture[:, None]
     vertices = ctx.buffer(corners)
     starts = np.searchsorted(stream.run, np.arange(2 * len(plant.materials) + 1))
-    colors = () if plant.colors is None else ("VERTEX_COLORS",)
     for plane in CLIP_PLANES:
         ctx.enable_direct(plane)
     for side in (1, -1):
@@ -178,8 +201,11 @@ def _draw(
             first, end = int(starts[run]), int(starts[run + 1])
             if first == end:
                 continue
-            mapped = () if group.normal_map is None else ("NORMAL_MAP",)
-            shader = program(ctx, "picture.vert", "picture.frag", *colors, *mapped)
+            defines = _defines(buffers, group, baked, light)
+            shader = program(ctx, "picture.vert", "picture.frag", *defines)
+            if baked is not None:
+                set_light(shader, buffers, baked.light, baked.shadows)
+                shader["both_sides"] = baked.both_sides
             shader["side"] = side
             shader["tile"] = tile
             shader["vertices"] = 2
@@ -196,6 +222,28 @@ def _draw(
         ctx.disable_direct(plane)
     ctx.front_face = "ccw"
     vertices.release()
+
+
+def _defines(
+    buffers: PlantBuffers, group: MaterialGroup, baked: BakedLight | None, light: bool
+) -> list[str]:
+    """What the programs of pictures are made with."""
+    plant = buffers.plant
+    defines = {
+        "VERTEX_COLORS": plant.colors is not None,
+        "EXPOSURE": plant.exposure is not None,
+        "NORMAL_MAP": group.normal_map is not None,
+        "LIGHT_MAP": group.light_map is not None,
+        "LIT": baked is not None,
+        "LIGHT": light,
+    }
+    shadows = () if baked is None else baked.shadows.defines
+    return [*(name for name, wanted in defines.items() if wanted), *shadows]
+
+
+def _channels(normals: bool, light: bool) -> tuple[str, ...]:
+    """What is drawn beside colour and depth, in the order of the shaders' outputs."""
+    return ("normal",) * normals + ("light",) * light
 
 
 def _picture_table(buffers: PlantBuffers, pictures: Pictures) -> moderngl.Texture:
@@ -216,17 +264,23 @@ def _picture_table(buffers: PlantBuffers, pictures: Pictures) -> moderngl.Textur
 
 
 class _Samples:
-    """The supersampled target: colour, normal, depth."""
+    """The supersampled target: colour, depth, and other channels."""
 
-    def __init__(self, ctx: moderngl.Context, size: tuple[int, int]) -> None:
-        self.color = ctx.texture(size, 4, internal_format=RGB10_A2)
-        self.normal = ctx.texture(size, 4, internal_format=RGB10_A2)
-        self.depth = ctx.depth_texture(size)
-        self.depth.compare_func = ""  # read as a number
-        self.textures = (self.color, self.normal, self.depth)
-        for texture in self.textures:
+    def __init__(
+        self, ctx: moderngl.Context, size: tuple[int, int], channels: tuple[str, ...]
+    ) -> None:
+        depth = ctx.depth_texture(size)
+        depth.compare_func = ""  # read as a number
+        formats = {"normal": RGB10_A2, "light": None}
+        self.textures = {
+            "color": ctx.texture(size, 4, internal_format=RGB10_A2),
+            "depth": depth,
+            **{name: ctx.texture(size, 4, internal_format=formats[name]) for name in channels},
+        }
+        for texture in self.textures.values():
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        self.framebuffer = ctx.framebuffer([self.color, self.normal], self.depth)
+        drawn = [texture for name, texture in self.textures.items() if name != "depth"]
+        self.framebuffer = ctx.framebuffer(drawn, depth)
 
     def use(self, width: int, height: int) -> None:
         self.framebuffer.use()
@@ -235,30 +289,36 @@ class _Samples:
 
     def release(self) -> None:
         self.framebuffer.release()
-        for texture in self.textures:
+        for texture in self.textures.values():
             texture.release()
 
 
 class _Resolved:
-    """The atlas itself: colour, normal, depth, one texel for K x K samples."""
+    """The atlas itself: colour, depth and other channels, one texel for K x K samples."""
 
-    def __init__(self, ctx: moderngl.Context, size: tuple[int, int]) -> None:
+    def __init__(
+        self, ctx: moderngl.Context, size: tuple[int, int], channels: tuple[str, ...]
+    ) -> None:
         self.ctx = ctx
-        self.textures = (
-            ctx.texture(size, 4),
-            ctx.texture(size, 4),
-            ctx.texture(size, 1, dtype="nu2"),
-        )
-        self.framebuffer = ctx.framebuffer(self.textures)
+        self.textures = {
+            "color": ctx.texture(size, 4),
+            "depth": ctx.texture(size, 1, dtype="nu2"),
+            **{name: ctx.texture(size, 4) for name in channels},
+        }
+        self.framebuffer = ctx.framebuffer(list(self.textures.values()))
 
     def resolve(self, target: _Samples, samples: int, tile: Tile) -> None:
         """Average the target's samples into a tile of the atlas."""
         self.framebuffer.use()
         self.framebuffer.viewport = tile
-        shader = program(self.ctx, "screen.vert", "picture_resolve.frag")
-        for unit, texture in enumerate(target.textures):
+        names = list(target.textures)
+        defines = ["NORMALS"] * ("normal" in names)
+        if "light" in names:
+            defines.append(f"LIGHT {names.index('light')}")
+        shader = program(self.ctx, "screen.vert", "picture_resolve.frag", *defines)
+        for unit, (name, texture) in enumerate(target.textures.items()):
             texture.use(unit)
-        shader["color_samples"], shader["normal_samples"], shader["depth_samples"] = 0, 1, 2
+            shader[f"{name}_samples"] = unit
         shader["samples"] = samples
         shader["corner"] = tile[:2]
         self.ctx.enable_only(moderngl.NOTHING)
@@ -266,23 +326,27 @@ class _Resolved:
         array.render(moderngl.TRIANGLES, vertices=3)
         array.release()
 
-    def read(self) -> tuple[ByteArray, ByteArray, np.ndarray]:
+    def read(self) -> dict[str, np.ndarray]:
+        """By channel, as in Drawn."""
         width, height = self.framebuffer.size
         self.framebuffer.viewport = (0, 0, width, height)
-
-        def plane(attachment: int, components: int, dtype: str, kind: type) -> np.ndarray:
+        kinds = {
+            "color": (4, "f1", np.uint8),
+            "depth": (1, "nu2", np.uint16),
+            "normal": (3, "f1", np.uint8),
+            "light": (4, "f1", np.uint8),
+        }
+        found: dict[str, np.ndarray] = {}
+        for attachment, name in enumerate(self.textures):
+            components, dtype, kind = kinds[name]
             data = self.framebuffer.read(
                 components=components, attachment=attachment, alignment=1, dtype=dtype
             )
-            return np.frombuffer(data, kind).reshape(height, width, components)
-
-        return (
-            plane(0, 4, "f1", np.uint8),
-            plane(1, 3, "f1", np.uint8),
-            plane(2, 1, "nu2", np.uint16)[..., 0],
-        )
+            plane: np.ndarray = np.frombuffer(data, kind).reshape(height, width, components)
+            found[name] = plane[..., 0] if components == 1 else plane
+        return found
 
     def release(self) -> None:
         self.framebuffer.release()
-        for texture in self.textures:
+        for texture in self.textures.values():
             texture.release()

@@ -1,4 +1,4 @@
-"""Shader programs, made once per context from the files in `shaders/`.
+"""Shader programs, made once per context from the files in `shaders/` and in lighting/.
 
 A line `#include "name.glsl"` is replaced by that file. Names given as `defines` follow `#version`.
 """
@@ -35,7 +35,8 @@ def program(ctx: moderngl.Context, vertex: str, fragment: str, *defines: str) ->
 @cache
 def source(name: str) -> str:
     """The text of a shader file, its includes put in."""
-    text = (files("vegtool.gl") / "shaders" / name).read_text(encoding="utf-8")
+    found = (place / name for place in (files("vegtool.gl") / "shaders", files("vegtool.lighting")))
+    text = next(file for file in found if file.is_file()).read_text(encoding="utf-8")
     lines = []
     for line in text.splitlines():
         included = line.partition('#include "')[2]

@@ -8,8 +8,9 @@ import numpy as np
 
 from vegtool.arrays import FloatArray
 from vegtool.gl.context import check, framebuffer_kept
-from vegtool.gl.draw import Light, Shot, draw_tile, tiles
+from vegtool.gl.draw import Shot, draw_tile, tiles
 from vegtool.gl.upload import PlantBuffers
+from vegtool.lighting.light import Light
 
 WARM_UP = 2
 """Frames drawn first and not counted: programs are compiled, buffers uploaded."""

@@ -25,7 +25,12 @@ Owned = TypeVar("Owned", moderngl.Buffer, moderngl.Texture, moderngl.VertexArray
 
 SRGB8_ALPHA8 = 0x8C43
 VERTEX_FLOATS = 12
-"""Per vertex: position, u, normal, v, colour (4); three vec4, as attributes or as texels."""
+"""Per vertex: position, u, normal, v, colour (4); three vec4, as attributes or as texels. A fourth
+holds the exposure, where a plant has one."""
+ATTRIBUTES = {"in_position_u": 4, "in_normal_v": 4, "in_color": 4, "in_exposure": 2}
+"""Of vertices, and how many floats of a vec4 each takes."""
+LIGHT_MAP = 4
+"""Texture unit."""
 VERTICES_PER_ROW = 1024
 """Of the vertex data texture, or as many more as keep its height below the driver's limit."""
 MINIFIED = 4.0
@@ -45,6 +50,7 @@ class MaterialGroup:
     count: int
     color_map: moderngl.Texture
     normal_map: moderngl.Texture | None
+    light_map: moderngl.Texture | None
 
 
 class PlantBuffers:
@@ -103,17 +109,17 @@ class PlantBuffers:
 
     @cached_property
     def vertices(self) -> moderngl.Buffer:
-        """Three vec4 per vertex: `in_position_u`, `in_normal_v`, `in_color`."""
+        """Vec4 after vec4 per vertex: ATTRIBUTES, the exposure where there is one."""
         return self._own(
             self.ctx.buffer(vertex_data(self.plant, self.origin, self.scale).tobytes())
         )
 
     @cached_property
     def vertex_texture(self) -> moderngl.Texture:
-        """The same three vec4 per vertex as RGBA32F texels, whole vertices to a row."""
+        """The same vec4 per vertex as RGBA32F texels, whole vertices to a row."""
         data = vertex_data(self.plant, self.origin, self.scale)
         limit = describe(self.ctx).max_texture
-        width = 3 * max(VERTICES_PER_ROW, -(-len(data) // limit))
+        width = data.shape[1] // 4 * max(VERTICES_PER_ROW, -(-len(data) // limit))
         rows = max(1, -(-data.size // (4 * width)))
         texels = np.zeros((rows, width, 4), dtype=np.float32)
         texels.reshape(-1)[: data.size] = data.reshape(-1)
@@ -144,12 +150,11 @@ class PlantBuffers:
         return bool(self.texels_per_metre[group.number] > MINIFIED * samples_per_metre)
 
     def vertex_array(self, program: moderngl.Program) -> moderngl.VertexArray:
-        """The plant as input of `program`, which declares in_position_u, in_normal_v, in_color."""
+        """The plant as input of `program`, which declares some of ATTRIBUTES."""
         if program not in self._arrays:
-            names = [n for n in ("in_position_u", "in_normal_v", "in_color") if n in program]
-            layout = " ".join(
-                "4f" if n in names else "16x" for n in ("in_position_u", "in_normal_v", "in_color")
-            )
+            here = list(ATTRIBUTES)[: 3 + (self.plant.exposure is not None)]
+            names = [name for name in here if name in program]
+            layout = " ".join(_layout(ATTRIBUTES[n] if n in names else 0) for n in here)
             self._arrays[program] = self._own(
                 self.ctx.vertex_array(program, [(self.vertices, layout, *names)], self.indices)
             )
@@ -158,7 +163,8 @@ class PlantBuffers:
     def use(
         self, group: MaterialGroup, program: moderngl.Program, *, point_sampled: bool = False
     ) -> None:
-        """Bind a material's textures (units 0 and 1) and set the uniforms of `material.glsl`.
+        """Bind a material's textures (units 0, 1 and LIGHT_MAP) and set the uniforms of
+        `material.glsl` and `lit.glsl`.
 
         point_sampled: take the nearest texel of the colour texture, unfiltered.
         """
@@ -169,6 +175,8 @@ class PlantBuffers:
         group.color_map.use(0)
         if group.normal_map is not None:
             group.normal_map.use(1)
+        if group.light_map is not None:
+            group.light_map.use(LIGHT_MAP)
         cutoff = material.alpha_cutoff if material.alpha_mode == "mask" else 0.0
         values = {
             "color_map": 0,
@@ -176,6 +184,9 @@ class PlantBuffers:
             "base_color": tuple(material.base_color),
             "alpha_cutoff": cutoff,
             "normal_scale": material.normal_scale,
+            "light_map": LIGHT_MAP,
+            "transmission": material.transmission,
+            "transmission_tint": tuple(material.transmission_tint),
         }
         for name, value in values.items():
             if name in program:  # the compiler drops what a variant does not read
@@ -191,15 +202,17 @@ class PlantBuffers:
                 int(first),
                 int(count),
                 self._texture(material.color_texture, True, material.alpha_mode == "mask"),
-                None
-                if material.normal_texture is None
-                else self._texture(material.normal_texture, False, False),
+                self._plain(material.normal_texture),
+                self._plain(material.light_texture),
             )
             for number, (material, first, count) in enumerate(
                 zip(self.plant.materials, firsts, counts, strict=True)
             )
             if count
         )
+
+    def _plain(self, image: Texture | None) -> moderngl.Texture | None:
+        return None if image is None else self._texture(image, False, False)
 
     def _texture(self, image: Texture | None, srgb: bool, cut_out: bool) -> moderngl.Texture:
         key = (id(image), srgb, cut_out)
@@ -233,14 +246,22 @@ class PlantBuffers:
 
 def vertex_data(plant: Plant, origin: FloatArray, scale: float) -> npt.NDArray[np.float32]:
     """(v, 12) float32: position relative to origin, in units of scale, u, normal, v, linear colour
-    factors."""
-    data = np.empty((len(plant.positions), VERTEX_FLOATS), dtype=np.float32)
+    factors; (v, 16) with the exposure and two floats of nothing, where there is one."""
+    extra = 0 if plant.exposure is None else 4
+    data = np.zeros((len(plant.positions), VERTEX_FLOATS + extra), dtype=np.float32)
     data[:, 0:3] = (plant.positions - origin) / scale
     data[:, 3] = plant.uvs[:, 0]
     data[:, 4:7] = plant.normals
     data[:, 7] = plant.uvs[:, 1]
     data[:, 8:12] = 1.0 if plant.colors is None else plant.colors
+    if plant.exposure is not None:
+        data[:, 12:14] = plant.exposure
     return data
+
+
+def _layout(floats: int) -> str:
+    """How moderngl is told of a vec4 of which the first `floats` are read."""
+    return " ".join([f"{floats}f"] * bool(floats) + [f"{4 * (4 - floats)}x"] * (floats < 4))
 
 
 def bled_under_alpha(pixels: ByteArray) -> ByteArray:

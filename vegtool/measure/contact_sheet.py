@@ -6,13 +6,16 @@ magnified (nearest texel) to the same size, so that a person can compare pixel b
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from io import BytesIO
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from vegtool.arrays import ByteArray, Picture
+from vegtool.gl.sun import SunMaps
 from vegtool.gl.upload import PlantBuffers
+from vegtool.lighting.light import Light, Sun
 from vegtool.lod import Level, LodChain
 from vegtool.measure.background import bytes_over
 from vegtool.measure.pictures import client_plant, live, truth
@@ -30,14 +33,18 @@ def contact_sheet(chain: LodChain) -> bytes:
     plant = chain.levels[0].mesh
     assert plant is not None
     levels = chain.levels[1:]
-    with PlantBuffers(plant) as original:
+    with ExitStack() as stack:
+        original = stack.enter_context(PlantBuffers(plant))
+        light, shadows = Light(), None
+        if chain.baked:
+            sun = Sun(chain.baked["azimuth_deg"], chain.baked["elevation_deg"])
+            light, shadows = sun.light, stack.enter_context(SunMaps([original], sun.direction))
         cells = []
         for level in levels:
             camera = framed(plant.center, plant.radius, VIEW, level.near_distance_m, chain.display)
             with PlantBuffers(client_plant(level), mipmaps=True) as buffers:
-                cells.append(
-                    _cropped(truth(original, camera, supersample=4), live(buffers, camera))
-                )
+                above = truth(original, camera, light, 4, shadows)
+                cells.append(_cropped(above, live(buffers, camera, light)))
     width = MARGIN + len(levels) * (CELL + MARGIN)
     captions = [_caption(level, number) for number, level in enumerate(levels, start=1)]
     height = 2 * (CELL + MARGIN) + MARGIN + LINE * max(map(len, captions)) + 38

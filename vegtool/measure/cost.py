@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from vegtool.gl.draw import Light
 from vegtool.gl.upload import PlantBuffers
+from vegtool.lighting.light import Light
 from vegtool.lod import Level
 from vegtool.measure.pictures import client_plant, fragments, frame_seconds, renderer
 from vegtool.measure.views import Camera

@@ -7,10 +7,12 @@ import numpy as np
 from vegtool.arrays import FloatArray, Picture
 from vegtool.gl.context import context, describe
 from vegtool.gl.count import count_fragments
-from vegtool.gl.draw import ANISOTROPY, MSAA, Light, Shot, draw
+from vegtool.gl.draw import ANISOTROPY, MSAA, Shot, draw
+from vegtool.gl.sun import SunMaps
 from vegtool.gl.targets import drawing_target
 from vegtool.gl.timing import time_frames
 from vegtool.gl.upload import PlantBuffers
+from vegtool.lighting.light import Light
 from vegtool.lod import Level, level_triangles
 from vegtool.measure.views import Camera
 from vegtool.plant import Material, Plant, Texture
@@ -25,14 +27,19 @@ def client_plant(level: Level) -> Plant:
         assert level.mesh is not None
         return level.mesh
     assert level.atlas is not None
-    drawn = level_triangles(level)
-    opaque = np.full((*level.atlas.normal.shape[:2], 1), 255, np.uint8)
+    drawn, atlas = level_triangles(level), level.atlas
+    opaque = np.full((*atlas.color.shape[:2], 1), 255, np.uint8)
+    normal = None if atlas.normal is None else np.concatenate([atlas.normal, opaque], axis=2)
     material = Material(
         "level",
-        color_texture=Texture("color", level.atlas.color),
-        normal_texture=Texture("normal", np.concatenate([level.atlas.normal, opaque], axis=2)),
+        color_texture=Texture("color", atlas.color),
+        normal_texture=None if normal is None else Texture("normal", normal),
         alpha_mode="mask",
         double_sided=level.double_sided,
+        unlit=level.unlit,
+        light_texture=None if atlas.light is None else Texture("light", atlas.light),
+        transmission=0.0 if atlas.light is None else 1.0,
+        transmission_tint=atlas.transmission_tint,
     )
     faces = drawn.indices.reshape(-1, 3)
     return Plant(
@@ -72,9 +79,11 @@ def truth(
     camera: Camera,
     light: Light | None = None,
     supersample: int = TRUTH_SUPERSAMPLE,
+    shadows: SunMaps | None = None,
 ) -> Picture:
-    """The original as it is: alpha tested per sample, no mips. buffers: without mipmaps."""
-    return draw(buffers, _shot(camera), light or Light(), supersample)
+    """The original as it is: alpha tested per sample, no mips. buffers: without mipmaps. shadows:
+    what throws some."""
+    return draw(buffers, shot_of(camera), light or Light(), supersample, shadows=shadows)
 
 
 def live(
@@ -82,17 +91,20 @@ def live(
     camera: Camera,
     light: Light | None = None,
     anisotropy: int = ANISOTROPY,
+    shadows: SunMaps | None = None,
 ) -> Picture:
     """What a client shows: mip-mapped textures, alpha tested once per pixel, 4x multisampling
     resolved in linear light. buffers: with mipmaps. anisotropy: of textures; 1, trilinear
-    filtering, is how three.js comes. Raises CapabilityError where OpenGL cannot.
+    filtering, is how three.js comes. shadows: what throws some. Raises CapabilityError where OpenGL
+    cannot.
     """
-    return draw(buffers, _shot(camera), light or Light(), samples=MSAA, anisotropy=anisotropy)
+    shot, light = shot_of(camera), light or Light()
+    return draw(buffers, shot, light, samples=MSAA, anisotropy=anisotropy, shadows=shadows)
 
 
 def fragments(buffers: PlantBuffers, camera: Camera) -> int:
     """Fragments that a client shades where nothing hides anything: overdraw, alpha or not."""
-    return count_fragments(buffers, _shot(camera))
+    return count_fragments(buffers, shot_of(camera))
 
 
 def frame_seconds(
@@ -102,8 +114,9 @@ def frame_seconds(
 
     Raises CapabilityError as `live` does.
     """
-    return time_frames(buffers, _shot(camera), light or Light(), MSAA, repeats)
+    return time_frames(buffers, shot_of(camera), light or Light(), MSAA, repeats)
 
 
-def _shot(camera: Camera) -> Shot:
+def shot_of(camera: Camera) -> Shot:
+    """A camera in OpenGL's terms."""
     return Shot(camera.view_projection(), camera.target, camera.width, camera.height)

@@ -18,8 +18,9 @@ from scipy.spatial import ConvexHull, QhullError
 
 from vegtool.arrays import FloatArray, Picture
 from vegtool.errors import UsageError
-from vegtool.gl.draw import Light
+from vegtool.gl.sun import SunMaps
 from vegtool.gl.upload import PlantBuffers
+from vegtool.lighting.light import Light
 from vegtool.lod import Display, Level, Spread
 from vegtool.measure.metrics import METRICS, Reference, reference, score
 from vegtool.measure.pictures import client_plant, live, truth
@@ -37,11 +38,20 @@ Result = TypeVar("Result")
 
 
 @dataclass(frozen=True, eq=False)
+class Shadowed:
+    """A light that does not move, and what its sun sees."""
+
+    light: Light
+    shadows: SunMaps
+
+
+@dataclass(frozen=True, eq=False)
 class Truths:
     """What a plant really looks like, from each of the views v at each of the distances d.
 
     pixels, distance_m: (d,) sizes on the screen and the distances that give them on `display`.
-    cameras, references: [d][v].
+    cameras, references: [d][v]. under: the light that does not move, with its shadows; None where
+    each view has a sun of its own, which throws none.
     """
 
     plant: Plant
@@ -51,6 +61,16 @@ class Truths:
     distance_m: FloatArray
     cameras: tuple[tuple[Camera, ...], ...]
     references: tuple[tuple[Reference, ...], ...]
+    under: Shadowed | None = None
+
+    def light(self, view: View) -> Light:
+        """What a view is drawn under."""
+        return Light(direction=view.sun) if self.under is None else self.under.light
+
+    @property
+    def shadows(self) -> SunMaps | None:
+        """What throws shadows."""
+        return None if self.under is None else self.under.shadows
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,12 +93,14 @@ def truths(
     display: Display | None = None,
     progress: Progress = silent,
     buffers: PlantBuffers | None = None,
+    under: Shadowed | None = None,
 ) -> Truths:
     """Draw the truth of each view at each size, 8 x 8 samples to the pixel.
 
     pixels: sizes on the screen, any order; kept in descending order. Sizes at which a display of
     so wide an angle would have to stand within the plant are left out; UsageError where none is
-    left. buffers: the plant's, without mipmaps, where there are some.
+    left. buffers: the plant's, without mipmaps, where there are some. under: the light of all
+    views, where it does not move.
     """
     display = display or Display()
     sizes, distances = outside(plant, pixels, display)
@@ -90,8 +112,9 @@ def truths(
 
     def pictures(draw_from: PlantBuffers) -> list[Reference]:
         def draw(row: int, column: int) -> Picture:
-            light = Light(direction=views[column].sun)
-            return truth(draw_from, cameras[row][column], light)
+            light = Light(direction=views[column].sun) if under is None else under.light
+            shadows = None if under is None else under.shadows
+            return truth(draw_from, cameras[row][column], light, shadows=shadows)
 
         return _drawn_and(reference_of, draw, (len(sizes), len(views)), "truth", progress)
 
@@ -104,7 +127,7 @@ def truths(
     else:
         found = pictures(buffers)
     rows = tuple(tuple(found[i * len(views) : (i + 1) * len(views)]) for i in range(len(sizes)))
-    return Truths(plant, display, tuple(views), sizes, distances, cameras, rows)
+    return Truths(plant, display, tuple(views), sizes, distances, cameras, rows, under)
 
 
 def outside(
@@ -127,12 +150,18 @@ def outside(
 class TruthsAt:
     """What a plant looks like from the same views at any distance, each drawn once.
 
-    plant, views, display: as of `truths`. buffers: the plant's, without mipmaps.
+    plant, views, display, under: as of `truths`. buffers: the plant's, without mipmaps.
     """
 
     def __init__(
-        self, plant: Plant, views: Sequence[View], display: Display, buffers: PlantBuffers
+        self,
+        plant: Plant,
+        views: Sequence[View],
+        display: Display,
+        buffers: PlantBuffers,
+        under: Shadowed | None = None,
     ) -> None:
+        self.under = under
         self.plant, self.views, self.display = plant, tuple(views), display
         self._buffers = buffers
         self._known: dict[float, Truths] = {}
@@ -142,13 +171,13 @@ class TruthsAt:
         if distance_m not in self._known:
             size = self.plant.extent * self.display.pixels_per_metre(distance_m)
             self._known[distance_m] = truths(
-                self.plant, self.views, [size], self.display, progress, self._buffers
+                self.plant, self.views, [size], self.display, progress, self._buffers, self.under
             )
         return self._known[distance_m]
 
     def from_views(self, views: Sequence[View]) -> TruthsAt:
         """The same plant from other views."""
-        return TruthsAt(self.plant, views, self.display, self._buffers)
+        return TruthsAt(self.plant, views, self.display, self._buffers, self.under)
 
 
 def scores(
@@ -174,7 +203,8 @@ def scores(
 
     def draw(row: int, column: int) -> Picture:
         view = truths.views[column]
-        return live(buffers_for(view), truths.cameras[row][column], Light(direction=view.sun))
+        camera, light = truths.cameras[row][column], truths.light(view)
+        return live(buffers_for(view), camera, light, shadows=truths.shadows)
 
     def scored(row: int, column: int, picture: Picture) -> dict[str, float]:
         return score(truths.references[row][column], picture)

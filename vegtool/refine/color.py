@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vegtool.arrays import ByteArray, FloatArray, Picture
-from vegtool.gl.draw import Light
 from vegtool.lod import Level
 from vegtool.measure.metrics import LUMINANCE
 from vegtool.measure.scores import Truths
@@ -53,7 +52,7 @@ def unbiased_color(level: Level, truths: Truths) -> Level:
 def shares(level: Level, truths: Truths) -> Shares:
     """Draw the level, then its billboards beside a black mesh, and compare both with the truth."""
     cameras = [camera for row in truths.cameras for camera in row]
-    lights = [Light(direction=view.sun) for _ in truths.cameras for view in truths.views]
+    lights = [truths.light(view) for _ in truths.cameras for view in truths.views]
     true = np.array([reference.luminance for row in truths.references for reference in row])
     whole = luminances(drawn(level, cameras, lights))
     known = (true > 0) & (whole > 0)

@@ -29,7 +29,6 @@ from scipy.ndimage import distance_transform_edt
 
 from vegtool.arrays import ByteArray, FloatArray, IntArray, SingleArray
 from vegtool.baking.coverage import owners
-from vegtool.gl.draw import Light
 from vegtool.lod import Atlas, Level
 from vegtool.measure.scores import Truths
 from vegtool.refine.drawn import drawn
@@ -178,7 +177,7 @@ def measured_bias(level: Level, truths: Sequence[Truths]) -> float | None:
     """How much more than the truth a level covers, as a share of that: mean over views and
     distances. None where the truth covers nothing."""
     cameras = [camera for t in truths for row in t.cameras for camera in row]
-    lights = [Light(direction=view.sun) for t in truths for _ in t.cameras for view in t.views]
+    lights = [t.light(view) for t in truths for _ in t.cameras for view in t.views]
     true = np.array([r.covered for t in truths for row in t.references for r in row])
     if not (true > 0).any():
         return None

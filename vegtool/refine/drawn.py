@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from vegtool.arrays import Picture
-from vegtool.gl.draw import Light
 from vegtool.gl.upload import PlantBuffers
+from vegtool.lighting.light import Light
 from vegtool.lod import Level
 from vegtool.measure.pictures import client_plant, live
 from vegtool.measure.views import Camera

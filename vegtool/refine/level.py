@@ -16,9 +16,10 @@ import numpy as np
 import numpy.typing as npt
 
 from vegtool.arrays import IntArray
-from vegtool.baking.bake import bake
+from vegtool.baking.bake import bake, transmission_tint
 from vegtool.baking.options import BakeOptions
 from vegtool.boxes import geometric_error
+from vegtool.gl.pictures import BakedLight
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Level
 from vegtool.measure.distances import rounded_up
@@ -28,7 +29,9 @@ from vegtool.progress import Progress, silent
 from vegtool.refine.color import unbiased_color
 from vegtool.refine.coverage import solve_coverage
 from vegtool.refine.foliage import Leaves, leaves_of, reduced_leaves
-from vegtool.refine.mesh import joined
+from vegtool.refine.lit import lit_plant
+from vegtool.refine.mesh import Scattering, joined
+from vegtool.refine.occlusion import exposed_like
 from vegtool.refine.planes import planes
 from vegtool.refine.wood import Wood, reduced_wood, wood_triangles
 from vegtool.refine.wood_stems import Stems, stems_of
@@ -43,6 +46,7 @@ SMALL = 12.0
 are tried. On five plants they erred less than pictures up to 8, and more from 14 on."""
 
 
+TINY = float(np.finfo(float).tiny)
 TEXTURED = 0.95
 """Of what a level without textures errs: no more than that may one with them, or it is not worth
 its texels."""
@@ -53,27 +57,46 @@ class Source:
     """What all levels of a plant are made from.
 
     buffers: the plant's, without mipmaps. truth_at: what it looks like. wood, leaf: (k,) int32, the
-    faces of either role; wood alone counts as leaves, since nothing else shows it.
+    faces of either role; wood alone counts as leaves, since nothing else shows it. lit: light that
+    goes into the colours, or None for levels that clients light.
     """
 
     buffers: PlantBuffers
     truth_at: TruthsAt
     wood: IntArray
     leaf: IntArray
+    lit: BakedLight | None = None
 
     @property
     def plant(self) -> Plant:
         return self.buffers.plant
 
     @cached_property
+    def colored(self) -> Plant:
+        """The plant with the colours that triangles take."""
+        if self.lit is None:
+            return self.plant
+        return lit_plant(self.plant, self.lit.light, self.lit.shadows.read())
+
+    @cached_property
+    def scattering(self) -> tuple[Scattering, Scattering]:
+        """Of wood and of leaves, where they are triangles."""
+        if self.lit is not None:
+            return Scattering(unlit=True), Scattering(unlit=True)
+        materials, leaf = self.plant.materials, self.plant.face_material[self.leaf]
+        area = np.bincount(leaf, self.plant.face_areas[self.leaf], len(materials))
+        share = area @ np.array([m.transmission for m in materials]) / max(area.sum(), TINY)
+        return Scattering(), Scattering(False, float(share), transmission_tint(self.plant))
+
+    @cached_property
     def stems(self) -> Stems | None:
         """The wood as stems; None where there is none."""
-        return stems_of(self.plant, self.wood) if len(self.wood) else None
+        return stems_of(self.colored, self.wood) if len(self.wood) else None
 
     @cached_property
     def leaves(self) -> Leaves | None:
         """The leaves as what they cover; None where there are none."""
-        return leaves_of(self.plant, self.leaf) if len(self.leaf) else None
+        return leaves_of(self.colored, self.leaf) if len(self.leaf) else None
 
 
 @dataclass(frozen=True)
@@ -102,14 +125,14 @@ class Made:
     by_mesh: npt.NDArray[np.bool_]
 
 
-def source_of(buffers: PlantBuffers, truth_at: TruthsAt) -> Source:
+def source_of(buffers: PlantBuffers, truth_at: TruthsAt, lit: BakedLight | None = None) -> Source:
     """What is known of a plant before its first level."""
     plant = buffers.plant
     wood = np.array([m.role == "wood" for m in plant.materials], dtype=bool)[plant.face_material]
     if wood.all():
         wood = ~wood
     faces = np.arange(len(plant.faces), dtype=np.int32)
-    return Source(buffers, truth_at, faces[wood], faces[~wood])
+    return Source(buffers, truth_at, faces[wood], faces[~wood], lit)
 
 
 def refined_level(source: Source, wanted: Wanted, progress: Progress = silent) -> Level:
@@ -205,8 +228,9 @@ def baked(
         BakeOptions(max_texture=wanted.max_texture, fit_alpha=False),
         lambda stage, fraction: progress(stage, 0.3 + 0.3 * fraction),
         white=wood is not None,
+        lit=source.lit,
     )
-    mesh = joined([wood], "wood")
+    mesh = joined([wood], "wood", source.scattering[:1])
     return (level if mesh is None else replace(level, kind="hybrid", mesh=mesh)), labels
 
 
@@ -224,10 +248,12 @@ def as_triangles(source: Source, wanted: Wanted, wood: Wood | None, triangles: i
     assert source.leaves is not None
     pixel_m = 1 / source.truth_at.display.pixels_per_metre(wanted.near_m)
     leaves = reduced_leaves(source.leaves, triangles, pixel_m)
-    mesh = joined([wood, leaves], source.plant.name)
+    mesh = joined([wood, leaves], source.plant.name, source.scattering)
     assert mesh is not None
+    mesh = exposed_like(mesh, source.colored)
     none = np.full(len(source.plant.faces), -1, dtype=np.int32)
-    level = unbiased_color(Level("mesh", mesh=mesh), source.truth_at(wanted.near_m))
+    made = Level("mesh", mesh=mesh, unlit=source.lit is not None)
+    level = unbiased_color(made, source.truth_at(wanted.near_m))
     return Made(level, none, none < 0)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -25,19 +25,41 @@ class ColoredMesh:
 
     def __post_init__(self) -> None:
         name, n = type(self).__name__, len(self.positions)
-        for field in ("positions", "normals", "colors"):
-            value = checked(f"{name}.{field}", getattr(self, field), (n, 3), np.float64)
-            object.__setattr__(self, field, value)
+        for item in ("positions", "normals", "colors"):
+            value = checked(f"{name}.{item}", getattr(self, item), (n, 3), np.float64)
+            object.__setattr__(self, item, value)
         faces = checked(f"{name}.faces", self.faces, (None, 3), np.int32, n)
         object.__setattr__(self, "faces", faces)
 
 
-def joined(parts: Sequence[ColoredMesh | None], name: str = "mesh") -> Plant | None:
-    """All parts as a plant with one opaque, double-sided material, as `Level.mesh` wants it; None
-    where no part has a face."""
-    some = [part for part in parts if part is not None and len(part.faces)]
-    if not some:
+@dataclass(frozen=True, eq=False)
+class Scattering:
+    """What a mesh's material says of light: unlit, or a share that passes through, (3,) tinted."""
+
+    unlit: bool = False
+    transmission: float = 0.0
+    tint: FloatArray = field(default_factory=lambda: np.ones(3))
+
+
+def joined(
+    parts: Sequence[ColoredMesh | None],
+    name: str = "mesh",
+    scattering: Sequence[Scattering] = (),
+) -> Plant | None:
+    """All parts as a plant, as `Level.mesh` wants it; None where no part has a face.
+
+    scattering: of each part, or none. Parts alike in it share an opaque, double-sided material, and
+    a client draws them by one call.
+    """
+    told = scattering or [Scattering()] * len(parts)
+    both = [(p, s) for p, s in zip(parts, told, strict=True) if p is not None and len(p.faces)]
+    if not both:
         return None
+    some = [part for part, _ in both]
+    kinds = [(s.unlit, s.transmission) for _, s in both]
+    first_of = {kind: index for index, kind in reversed(list(enumerate(kinds)))}
+    order = sorted(first_of.values())
+    number = [order.index(first_of[kind]) for kind in kinds]
     before = np.cumsum([0, *(len(part.positions) for part in some[:-1])])
     positions = np.concatenate([part.positions for part in some])
     colors = np.concatenate([part.colors for part in some])
@@ -48,7 +70,16 @@ def joined(parts: Sequence[ColoredMesh | None], name: str = "mesh") -> Plant | N
         np.concatenate([part.normals for part in some]),
         np.zeros((len(positions), 2)),
         faces.astype(np.int32),
-        np.zeros(len(faces), dtype=np.int32),
-        (Material(name, double_sided=True),),
+        np.repeat(number, [len(part.faces) for part in some]).astype(np.int32),
+        tuple(
+            Material(
+                name if len(order) == 1 else f"{name}_{i}",
+                double_sided=True,
+                unlit=both[i][1].unlit,
+                transmission=both[i][1].transmission,
+                transmission_tint=both[i][1].tint,
+            )
+            for i in order
+        ),
         np.concatenate([colors, np.ones((len(colors), 1))], axis=1),
     )

@@ -8,6 +8,8 @@ exponentially with the surface they turn towards the viewer.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from vegtool.arrays import FloatArray, unit
@@ -29,13 +31,26 @@ def seen(pieces: Pieces, surface: float, size: float, opacity: float) -> FloatAr
     surface: of all, squared radii; weights are shares of it. size: of a piece, radii. opacity: the
     share of a piece that hides what is behind it.
     """
-    if size == 0:
-        return np.ones(len(pieces))
     total = np.zeros(len(pieces))
     shown = np.zeros(len(pieces))
+    for direction, toward, away in transmittances(pieces, surface, size, opacity):
+        turned = turned_to(pieces, direction)
+        total += turned * (toward + away) / 2
+        shown += turned
+    return np.divide(total, shown, out=np.ones_like(total), where=shown > 0)
+
+
+def transmittances(
+    pieces: Pieces, surface: float, size: float, opacity: float
+) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
+    """For each of DIRECTIONS, (3,) unit in the plant's own frame, the shares (n,) and (n,) of light
+    that reach pieces from there and from the opposite one; arguments as of `seen`."""
     for direction in even_directions(DIRECTIONS):
-        turned = np.sqrt(np.maximum(pieces.looks @ tensor(direction[None])[0], 0.0))
-        depth = opacity * surface * pieces.weight * turned / (COLUMN * size) ** 2
+        if size == 0:
+            yield direction, np.ones(len(pieces)), np.ones(len(pieces))
+            continue
+        depth = opacity * surface * pieces.weight * turned_to(pieces, direction)
+        depth = depth / (COLUMN * size) ** 2
         across = np.cross(direction, np.eye(3)[np.abs(direction).argmin()])
         sides = unit(np.stack([across, np.cross(direction, across)]))
         x, y = np.floor(sides @ pieces.middle.T / (COLUMN * size) + 0.5).astype(np.int64)
@@ -49,9 +64,12 @@ def seen(pieces: Pieces, surface: float, size: float, opacity: float) -> FloatAr
         before, behind = np.empty(len(pieces)), np.empty(len(pieces))
         behind[order] = through - depth[order] - start
         before[order] = end - through
-        total += turned * (np.exp(-np.maximum(before, 0)) + np.exp(-np.maximum(behind, 0))) / 2
-        shown += turned
-    return np.divide(total, shown, out=np.ones_like(total), where=shown > 0)
+        yield direction, np.exp(-np.maximum(before, 0)), np.exp(-np.maximum(behind, 0))
+
+
+def turned_to(pieces: Pieces, direction: FloatArray) -> FloatArray:
+    """(n,) root mean square of the cosines of the pieces' normals to a direction, (3,) unit."""
+    return np.asarray(np.sqrt(np.maximum(pieces.looks @ tensor(direction[None])[0], 0.0)))
 
 
 def even_directions(count: int) -> FloatArray:

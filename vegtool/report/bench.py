@@ -9,8 +9,8 @@ import numpy as np
 
 from vegtool.arrays import FloatArray
 from vegtool.formats.gltf import level_glb
-from vegtool.gl.draw import Light
 from vegtool.gl.upload import PlantBuffers
+from vegtool.lighting.light import Light
 from vegtool.lod import Level
 from vegtool.measure.bounds import (
     distance_for_pixels,

@@ -13,8 +13,8 @@ from matplotlib import colormaps
 from PIL import Image
 
 from vegtool.arrays import Picture, SingleArray
-from vegtool.gl.draw import Light
 from vegtool.gl.upload import PlantBuffers
+from vegtool.lighting.light import Light
 from vegtool.lod import Display, Level
 from vegtool.measure.background import bytes_over, over
 from vegtool.measure.flip import difference, perceived

@@ -117,7 +117,9 @@ def same(one: Level, two: Level) -> bool:
         return False
     pairs: list[tuple[npt.NDArray[Any], npt.NDArray[Any]]] = []
     if one.atlas and two.atlas and one.billboards and two.billboards:
-        pairs += [(one.atlas.color, two.atlas.color), (one.atlas.normal, two.atlas.normal)]
+        pairs += [(one.atlas.color, two.atlas.color), (one.atlas.depth, two.atlas.depth)]
+        if one.atlas.normal is not None and two.atlas.normal is not None:
+            pairs += [(one.atlas.normal, two.atlas.normal)]
         pairs += [(one.billboards.center, two.billboards.center)]
     if one.mesh and two.mesh:
         pairs += [(one.mesh.corners, two.mesh.corners)]

@@ -1,24 +1,22 @@
-// Diffuse light from a sun and a sky, linear and premultiplied by coverage.
+// What a camera sees: linear light, premultiplied by coverage.
 #include "material.glsl"
-
-uniform vec3 sun_direction;  // unit, towards the sun
-uniform float sun;
-uniform vec2 sky;  // from above, from below
+#ifndef UNLIT
+#include "lit.glsl"
+#endif
 
 in vec3 position;
 in vec3 normal;
 in vec2 uv;
 in vec4 vertex_color;
+in vec2 exposure;
 
 out vec4 fragment;
 
 void main() {
     vec3 color = surface_color(uv, vertex_color);
-    vec3 n = unit(normal);
-#ifdef NORMAL_MAP
-    n = mapped_normal(n, position, uv);
+#ifndef UNLIT
+    vec3 n = surface_normal(normal, position, uv);
+    color = lit(surface(color, turned(n, gl_FrontFacing), exposure, uv, gl_FrontFacing), position);
 #endif
-    if (!gl_FrontFacing) n = -n;
-    float ambient = mix(sky.y, sky.x, 0.5 + 0.5 * n.y);
-    fragment = vec4(color * (sun * max(dot(n, sun_direction), 0.0) + ambient), 1.0);
+    fragment = vec4(color, 1.0);
 }

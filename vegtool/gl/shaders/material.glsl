@@ -43,3 +43,11 @@ vec3 mapped_normal(vec3 normal, vec3 position, vec2 uv) {
     return unit(unit(tangent) * texel.x + unit(bitangent) * texel.y + normal * texel.z);
 }
 #endif
+
+vec3 surface_normal(vec3 normal, vec3 position, vec2 uv) {
+#ifdef NORMAL_MAP
+    return mapped_normal(unit(normal), position, uv);
+#else
+    return unit(normal);
+#endif
+}
