@@ -46,11 +46,12 @@ def draw(
 ) -> Picture:
     """The picture of a plant or level.
 
-    supersample: samples per axis and pixel, averaged. samples: of multisampling, 0 for none; alpha
-    is tested once per pixel then, as in a client. anisotropy: most taps of a mip-mapped texture; 1
-    is trilinear filtering. shadows: what the sun sees, for shadows to be drawn; light comes from
-    their direction then. Raises CapabilityError where OpenGL cannot multisample so, or cannot
-    hold the plant or the picture.
+    supersample: samples per axis and pixel, averaged; mip-mapped textures are filtered as for one
+    of the whole pixel, so that the mean is that of pictures moved by parts of a pixel. samples: of
+    multisampling, 0 for none; alpha is tested once per pixel then, as in a client. anisotropy: most
+    taps of a mip-mapped texture; 1 is trilinear filtering. shadows: what the sun sees, for shadows
+    to be drawn; light comes from their direction then. Raises CapabilityError where OpenGL cannot
+    multisample so, or cannot hold the plant or the picture.
     """
     ctx = buffers.ctx
     picture = np.empty((shot.height, shot.width, 4), np.float32)
@@ -119,6 +120,7 @@ def render(
     for group in buffers.groups:
         shader = shader_of(buffers, group, "camera.frag", anisotropy, shadows)
         shader["view_projection"] = matrix
+        set_footprint(shader, supersample)
         set_light(shader, buffers, light, shadows)
         buffers.use(group, shader, point_sampled=buffers.minified(group, samples_per_metre))
         render_group(buffers, group, shader)
@@ -147,6 +149,12 @@ def shader_of(
     if shadows is not None and not material.unlit:
         told += shadows.defines
     return program(buffers.ctx, "camera.vert", fragment, *told)
+
+
+def set_footprint(shader: moderngl.Program, footprint: float) -> None:
+    """Set the uniform of filter.glsl, where a program has it."""
+    if "footprint" in shader:
+        shader["footprint"] = float(footprint)
 
 
 def set_light(

@@ -163,7 +163,7 @@ class TruthsAt:
     ) -> None:
         self.under = under
         self.plant, self.views, self.display = plant, tuple(views), display
-        self._buffers = buffers
+        self.buffers = buffers
         self._known: dict[float, Truths] = {}
 
     def __call__(self, distance_m: float, progress: Progress = silent) -> Truths:
@@ -171,13 +171,13 @@ class TruthsAt:
         if distance_m not in self._known:
             size = self.plant.extent * self.display.pixels_per_metre(distance_m)
             self._known[distance_m] = truths(
-                self.plant, self.views, [size], self.display, progress, self._buffers, self.under
+                self.plant, self.views, [size], self.display, progress, self.buffers, self.under
             )
         return self._known[distance_m]
 
     def from_views(self, views: Sequence[View]) -> TruthsAt:
         """The same plant from other views."""
-        return TruthsAt(self.plant, views, self.display, self._buffers, self.under)
+        return TruthsAt(self.plant, views, self.display, self.buffers, self.under)
 
 
 def scores(

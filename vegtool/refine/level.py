@@ -26,6 +26,8 @@ from vegtool.measure.distances import rounded_up
 from vegtool.measure.scores import TruthsAt, scores
 from vegtool.plant import Plant
 from vegtool.progress import Progress, silent
+from vegtool.refine.balance import balanced
+from vegtool.refine.brightness import Brightness, brightness_of
 from vegtool.refine.color import unbiased_color
 from vegtool.refine.coverage import solve_coverage
 from vegtool.refine.foliage import Leaves, leaves_of, reduced_leaves
@@ -87,6 +89,11 @@ class Source:
         area = np.bincount(leaf, self.plant.face_areas[self.leaf], len(materials))
         share = area @ np.array([m.transmission for m in materials]) / max(area.sum(), TINY)
         return Scattering(), Scattering(False, float(share), transmission_tint(self.plant))
+
+    @cached_property
+    def brightness(self) -> Brightness:
+        """What the plant's is from all around."""
+        return brightness_of(self.truth_at.buffers, self.truth_at.display, self.truth_at.under)
 
     @cached_property
     def stems(self) -> Stems | None:
@@ -153,14 +160,16 @@ def refined_level(source: Source, wanted: Wanted, progress: Progress = silent) -
         progress("foliage", 0.8)
         with timed(seconds, "foliage"):
             made = better(source, wanted, made, as_triangles(source, wanted, wood, left))
-    level = made.level
+    level = replace(made.level, near_distance_m=wanted.near_m)
+    progress("balance", 0.9)
+    with timed(seconds, "balance"):
+        level = balanced(level, source.plant, source.brightness)
     with timed(seconds, "error"):
         error = geometric_error(
             source.plant, made.labels, level.billboards, level.mesh, made.by_mesh
         )
     return replace(
         level,
-        near_distance_m=wanted.near_m,
         geometric_error_m=error,
         seconds={**seconds, **level.seconds},
     )

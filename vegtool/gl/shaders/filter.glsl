@@ -5,9 +5,11 @@
 // takes three times as long and leaves a fifth less of a tree 100 pixels high.
 const float STILL = 1e-4;  // texels, squared: a face that shows one place of the texture all over
 
+uniform float footprint;   // of a sample, along each axis: as of a pixel, however many it has
+
 vec4 filtered(sampler2D map, vec2 uv) {
     vec2 size = vec2(textureSize(map, 0));
-    vec2 dx = dFdx(uv), dy = dFdy(uv);
+    vec2 dx = footprint * dFdx(uv), dy = footprint * dFdy(uv);
     vec2 x = dx * size, y = dy * size;
     bool along_x = dot(x, x) >= dot(y, y);
     float longest = along_x ? dot(x, x) : dot(y, y);  // texels, squared

@@ -1,0 +1,222 @@
+"""A level as bright as its plant from every side, under every sun.
+
+Colours that are right on the whole (color.py) may be too bright against the light and too dark with
+it. What is free to mend that is found from what a level shows of each of its pictures and triangles
+from many views.
+
+Bend: how far normals lean along billboards, and up and down (bend.py), is two numbers for a level:
+those at which its brightness errs least.
+
+Gains and turns: brightness is linear in the colours of pictures and triangles, and nearly so in
+small turns of their normals. The least changes that bring it near the plant's from all sides are
+those of ridge regression (Hoerl, Kennard: Ridge regression: biased estimation for nonorthogonal
+problems, 1970), solved by its dual, which is as large as there are views and suns.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vegtool.arrays import FloatArray, IntArray, unit
+from vegtool.gl.surface import surface
+from vegtool.gl.upload import PlantBuffers
+from vegtool.lighting.light import Light
+from vegtool.lighting.shading import shaded
+from vegtool.lod import Level
+from vegtool.measure.metrics import LUMINANCE
+from vegtool.measure.pictures import client_plant, shot_of
+from vegtool.plant import Plant
+from vegtool.refine.bend import Bend, bent, bent_level
+from vegtool.refine.brightness import PIXELS, Brightness
+from vegtool.refine.color import BRIGHTER, LEAST_GAIN, MOST_GAIN
+from vegtool.refine.retouch import elements_of, retouched
+
+LEANS = (1.0, 0.85, 0.7, 0.55, 0.4, 0.25)
+HEIGHTS = (1.0, 0.9, 0.8, 0.7, 0.6)
+"""Of bends, tried one after the other, and each until it gets worse."""
+RIDGE = 1.0
+"""Of the mean square of what views show: what it costs to change a colour or a normal."""
+MOST_TURN = 0.5
+"""Radians."""
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """What a level of `elements` pictures and triangles shows, n samples from all views.
+
+    count: (v,) how many from each view. view, element: (n,) which. albedo, tinted: (n,) luminance,
+    and that of light passing through.
+    normal, plane: (n, 3) unit, both on the viewer's side. exposure: (n, 2). transmission: (n,).
+    pictured: (n,) bool, those of billboards.
+    """
+
+    elements: int
+    count: IntArray
+    view: IntArray
+    element: IntArray
+    albedo: FloatArray
+    tinted: FloatArray
+    normal: FloatArray
+    plane: FloatArray
+    exposure: FloatArray
+    transmission: FloatArray
+    pictured: np.ndarray
+
+
+def balanced(level: Level, plant: Plant, wanted: Brightness) -> Level:
+    """The level with normals bent, where that helps, and with the colours and normals of pictures
+    and triangles changed, each by itself.
+
+    Seen from where it may be used on. plant: what it is made of. A level whose light is in its
+    colours has those changed alone. Raises CapabilityError where OpenGL cannot draw.
+    """
+    samples = _samples(level, plant, wanted)
+    known = (samples.count > 0) & (wanted.values > 0).all(axis=1)
+    if not known.any():
+        return level
+    if level.unlit:
+        gain, _ = ridge(_unlit(samples, wanted, known), None)
+        return retouched(level, gain, np.zeros((len(gain), 3)))
+    bend = best_bend(level, samples, wanted, known)
+    samples = replace(samples, normal=bent(samples.normal, samples.plane, bend, samples.pictured))
+    gain, turn = ridge(*_matrices(samples, wanted, known))
+    return retouched(bent_level(level, bend), gain, turn)
+
+
+def best_bend(level: Level, samples: Samples, wanted: Brightness, known: np.ndarray) -> Bend:
+    """The bend of LEANS and HEIGHTS at which brightness is nearest to the plant's, but for one
+    factor."""
+
+    def error(bend: Bend) -> float:
+        normal = bent(samples.normal, samples.plane, bend, samples.pictured)
+        found = _brightness(replace(samples, normal=normal), wanted)[known] / wanted.values[known]
+        return float(found.std() / found.mean())
+
+    best, least = Bend(), error(Bend())
+    mapped = level.atlas is not None and level.atlas.normal is not None
+    for name, values in (("lean", LEANS[1:] * mapped), ("height", HEIGHTS[1:])):
+        for value in values:
+            tried = replace(best, **{name: value})
+            if (found := error(tried)) >= least:
+                break
+            best, least = tried, found
+    return best
+
+
+def ridge(shown: FloatArray, turning: FloatArray | None) -> tuple[FloatArray, FloatArray]:
+    """(e,) gains and (e, 3) turns with which the rows of (m, e), and of (m, 3 e), their change by
+    turns about x, y, z, come nearer to sums of BRIGHTER."""
+    count = shown.shape[1]
+    matrix = shown if turning is None else np.concatenate([shown, turning], axis=1)
+    square = matrix @ matrix.T
+    cost = RIDGE * max(float(np.trace(square)) / len(square), np.finfo(float).tiny)
+    missing = BRIGHTER - shown.sum(axis=1)
+    change = matrix.T @ np.linalg.solve(square + cost * np.eye(len(square)), missing)
+    gain = np.clip(1 + change[:count], LEAST_GAIN, MOST_GAIN)
+    if turning is None:
+        return gain, np.zeros((count, 3))
+    turn = change[count:].reshape(3, count).T
+    angle = np.linalg.norm(turn, axis=1, keepdims=True)
+    return gain, turn * np.minimum(1.0, MOST_TURN / np.maximum(angle, MOST_TURN))
+
+
+def _samples(level: Level, plant: Plant, wanted: Brightness) -> Samples:
+    """What the level shows from each view, its pictures filtered as at its nearest distance."""
+    drawn, element = client_plant(level), elements_of(level)
+    pictures = 0 if level.atlas is None else len(level.atlas.front)
+    pixels = plant.extent * wanted.display.pixels_per_metre(level.near_distance_m)
+    parts: list[tuple[np.ndarray, ...]] = []
+    side = unit(drawn.face_area_vectors / plant.radius**2)
+    with PlantBuffers(drawn, mipmaps=True) as buffers:
+        for number, camera in enumerate(wanted.cameras):
+            shot, footprint = shot_of(camera), PIXELS / pixels
+            seen = surface(buffers, shot, anisotropy=1, footprint=footprint)
+            face, color = seen.face, seen.color.astype(np.float64)
+            plane = side[face]
+            away = ((camera.eye - seen.position) * plane).sum(axis=1, keepdims=True) < 0
+            parts.append(
+                (
+                    np.full(len(face), number),
+                    element[face],
+                    color @ LUMINANCE,
+                    (color * seen.tint) @ LUMINANCE,
+                    seen.normal.astype(np.float64),
+                    np.where(away, -plane, plane),
+                    seen.exposure.astype(np.float64),
+                    seen.transmission.astype(np.float64),
+                )
+            )
+    columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
+    view_of, of_element, albedo, tinted, normal, planes, exposure, transmission = columns
+    return Samples(
+        int(element.max()) + 1,
+        np.bincount(view_of, minlength=len(wanted.cameras)).astype(np.int32),
+        view_of,
+        of_element,
+        albedo,
+        tinted,
+        normal,
+        planes,
+        exposure,
+        transmission,
+        of_element < pictures,
+    )
+
+
+def _light(samples: Samples, light: Light) -> FloatArray:
+    """(n,) luminance of samples under a light."""
+    albedo = samples.albedo[:, None]
+    tint = samples.tinted[:, None] / np.maximum(albedo, np.finfo(float).tiny)
+    passing, through = samples.transmission, samples.exposure[:, 1]
+    lit = shaded(albedo, samples.normal, light, samples.exposure, passing, tint, 1.0, through)
+    return np.asarray(lit[:, 0])
+
+
+def _brightness(samples: Samples, wanted: Brightness) -> FloatArray:
+    """(v, s) mean luminance of what the level covers."""
+    sums = [
+        np.bincount(samples.view, _light(samples, light), len(samples.count))
+        for light in wanted.lights
+    ]
+    return np.asarray(np.stack(sums, axis=1) / np.maximum(samples.count, 1)[:, None])
+
+
+def _matrices(
+    samples: Samples, wanted: Brightness, known: np.ndarray
+) -> tuple[FloatArray, FloatArray]:
+    """What each element adds to the mean luminance, (m, e), and how that changes with turns of its
+    normals about x, y and z, (m, 3 e), as shares of what the plant's is; a row for each view that
+    is known under each light."""
+    shown, turning = [], []
+    for number, light in enumerate(wanted.lights):
+        lit = _light(samples, light)
+        toward = samples.normal @ light.unit
+        front = light.sun * (1 - samples.transmission) * (toward > 0)
+        back = -light.sun * samples.transmission * samples.exposure[:, 1] * (toward < 0)
+        pull = samples.albedo * front + samples.tinted * back
+        slope = (light.sky_above - light.sky_below) / 2 * samples.albedo
+        moment = pull[:, None] * np.cross(samples.normal, light.unit)
+        moment += (slope * samples.exposure[:, 0])[:, None] * np.cross(
+            samples.normal, np.array([0.0, 1.0, 0.0])
+        )
+        true = wanted.values[:, number]
+        shown.append(_rows(samples, lit, true)[known])
+        turning.append(
+            np.concatenate([_rows(samples, axis, true)[known] for axis in moment.T], axis=1)
+        )
+    return np.concatenate(shown), np.concatenate(turning)
+
+
+def _unlit(samples: Samples, wanted: Brightness, known: np.ndarray) -> FloatArray:
+    """(m, e) the same of a level that shows its colours as they are."""
+    return _rows(samples, samples.albedo, wanted.values[:, 0])[known]
+
+
+def _rows(samples: Samples, values: FloatArray, true: FloatArray) -> FloatArray:
+    """(v, e) sums of values (n,) by view and element, over the samples of a view and (v,)."""
+    views, elements = len(samples.count), samples.elements
+    cell = samples.view * elements + samples.element
+    sums = np.bincount(cell, values, views * elements).reshape(views, elements)
+    return np.asarray(sums / np.maximum(samples.count * true, np.finfo(float).tiny)[:, None])

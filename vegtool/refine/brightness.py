@@ -1,0 +1,81 @@
+"""How bright a plant is from all around, under suns all around: what levels are balanced by.
+
+Drawn without light, from many views: then light is arithmetic (lighting/shading.py), for all suns
+at once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vegtool.arrays import FloatArray
+from vegtool.gl.surface import Seen, surface
+from vegtool.gl.upload import PlantBuffers
+from vegtool.lighting.light import Light
+from vegtool.lighting.shading import shaded
+from vegtool.lod import Display
+from vegtool.measure.metrics import LUMINANCE
+from vegtool.measure.pictures import shot_of, truth
+from vegtool.measure.scores import Shadowed
+from vegtool.measure.views import Camera, around, views
+
+VIEWS, SUNS = 96, 8
+"""From all around, and how many suns shine on each. With a quarter of the views a level of 128
+triangles followed those and no others."""
+PIXELS = 120.0
+"""Size of the plant in the pictures by which brightness is found."""
+SUPERSAMPLE = 2
+"""Of the plant itself."""
+
+
+@dataclass(frozen=True, eq=False)
+class Brightness:
+    """Mean linear luminance of what a plant covers, (v, s), from each view under each light.
+
+    cameras: (v,) of the views, from where the plant is PIXELS large on the display.
+    """
+
+    display: Display
+    cameras: tuple[Camera, ...]
+    lights: tuple[Light, ...]
+    values: FloatArray
+
+
+def brightness_of(
+    buffers: PlantBuffers, display: Display, under: Shadowed | None = None
+) -> Brightness:
+    """Of a plant, from VIEWS all around under SUNS, or under the one light that does not move.
+
+    buffers: without mipmaps. Raises CapabilityError where OpenGL cannot draw.
+    """
+    plant, seen_from = buffers.plant, views("all", VIEWS)
+    distance = display.distance_m(PIXELS / plant.extent)
+    cameras = tuple(
+        around(plant.positions, view.direction, distance, display) for view in seen_from
+    )
+    if under is not None:
+        baked = [[_luminance(buffers, camera, under)] for camera in cameras]
+        return Brightness(display, cameras, (under.light,), np.array(baked))
+    lights = tuple(Light(direction=view.sun) for view in views("all", SUNS))
+    found = [surface(buffers, shot_of(camera), SUPERSAMPLE) for camera in cameras]
+    means = [
+        [light_of(seen, light).sum() / max(len(seen.face), 1) for light in lights] for seen in found
+    ]
+    return Brightness(display, cameras, lights, np.array(means))
+
+
+def light_of(seen: Seen, light: Light) -> FloatArray:
+    """(n,) linear luminance of samples under a light, without shadows."""
+    albedo = seen.color.astype(np.float64)
+    normal, exposure = seen.normal.astype(np.float64), seen.exposure.astype(np.float64)
+    tint, through = seen.tint.astype(np.float64), exposure[:, 1]
+    lit = shaded(albedo, normal, light, exposure, seen.transmission, tint, 1.0, through)
+    return np.asarray(lit @ LUMINANCE)
+
+
+def _luminance(buffers: PlantBuffers, camera: Camera, under: Shadowed) -> float:
+    picture = truth(buffers, camera, under.light, SUPERSAMPLE, under.shadows)
+    total = picture.sum(axis=(0, 1), dtype=np.float64)
+    return float(total[:3] @ LUMINANCE / max(total[3], 1.0))
