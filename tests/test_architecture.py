@@ -30,8 +30,9 @@ MAY_IMPORT: dict[str, set[str]] = {
     "measure": {"gl", "lighting"},
     "baselines": {"formats", "baking", "gl", "measure"},
     "refine": {"branches", "clustering", "boxes", "gl", "baking", "lighting", "measure"},
-    "convert": {"clustering", "boxes", "baking", "lighting", "measure", "refine"},
+    "convert": {"clustering", "boxes", "gl", "baking", "lighting", "measure", "refine"},
     "batch": {"convert", "formats", "measure"},
+    "scene": {"convert", "lighting"},
     "stability": {
         "branches", "clustering", "boxes", "gl", "lighting", "baking", "measure", "refine",
         "convert", "growth",
@@ -48,7 +49,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "__main__": {"cli"},
     "cli": {
         "batch", "console", "convert", "doctor", "flags", "formats", "growth", "inspect",
-        "measure", "outcomes", "report", "stability",
+        "measure", "outcomes", "report", "scene", "stability",
     },
 }  # fmt: skip
 

@@ -172,6 +172,68 @@ def test_dry_run_says_what_would_be_made_and_writes_nothing(
         assert planned["triangles"] == level["triangles"]
 
 
+def test_what_throws_the_shadow_is_written_beside_the_levels_and_told(
+    model: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    arguments = ["convert", str(model), "-o", str(out), *SMALL, "--shadow-proxy", "40"]
+    assert run([*arguments, "--dry-run", "--json"]) == 0
+    (planned,) = json.loads(capsys.readouterr().out)
+    assert run([*arguments, "--json"]) == 0
+    (made,) = json.loads(capsys.readouterr().out)
+    assert planned["files"] == made["files"] and planned["shadow"] == made["shadow"]
+    shadow = read_manifest(out / "bush.lod.json")["shadow"]
+    assert made["files"][str(out / "bush_shadow.glb")] == shadow["bytes"]
+    assert made["shadow"]["triangles"] == shadow["triangles"] <= 40
+    assert made["shadow"]["coverage_bias"] == shadow["coverage_bias"]["mean"]
+    spread = shadow["coverage_bias"]
+    assert made["shadow"]["worst_coverage_bias"] in (spread["low"], spread["high"])
+    assert made["shadow"]["silhouette"] == shadow["silhouette"]["mean"]
+    assert run([*arguments, "-f"]) == 0
+    said = capsys.readouterr().out
+    assert f"shadow: {shadow['triangles']} triangles; seen from 12 suns, 100 pixels large" in said
+    assert f"silhouette error {shadow['silhouette']['mean']}" in said
+    assert run(["convert", str(model), "-o", str(out), "-f", "--json", *SMALL]) == 0
+    assert json.loads(capsys.readouterr().out)[0]["shadow"] is None
+
+
+def test_packed_light_is_written_beside_the_levels(
+    model: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    arguments = ["convert", str(model), "-o", str(out), *SMALL, "--packed"]
+    lit = [*arguments, "--translucency", "0.4"]
+    assert run([*lit, "--dry-run", "--json"]) == 0
+    (planned,) = json.loads(capsys.readouterr().out)
+    assert run([*lit, "--json"]) == 0
+    (made,) = json.loads(capsys.readouterr().out)
+    assert planned["files"] == made["files"]
+    assert {"bush_LOD1_leaf.png", "bush_LOD2_leaf.png"} <= set(contents(out))
+    levels = read_manifest(out / "bush.lod.json")["levels"]
+    assert [level.get("leaf") for level in levels[1:]] == [
+        "bush_LOD1_leaf.png",
+        "bush_LOD2_leaf.png",
+    ]
+    assert run([*arguments, "-o", str(tmp_path / "plain")]) == 0
+    assert "--packed: no level has light beside its colours" in capsys.readouterr().err
+    assert not list((tmp_path / "plain").glob("*_leaf.png"))
+
+
+@pytest.mark.parametrize(
+    ("name", "option"),
+    [("bush_shadow.glb", ["--shadow-proxy", "8"]), ("bush_LOD1_leaf.png", ["--packed"])],
+)
+def test_files_in_the_way_are_refused_before_the_work(
+    name: str, option: list[str], model: Path, tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    (tmp_path / name).write_text("the user's own")
+    monkeypatch.setattr("vegtool.batch.convert", lambda *_: pytest.fail("worked"))
+    assert run(["convert", str(model), "-o", str(tmp_path), *SMALL, *option]) == 1
+    assert f"{name}: exists already" in capsys.readouterr().err
+    assert contents(tmp_path).keys() == {name}
+
+
 def test_one_bad_file_does_not_stop_the_others(
     model: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -206,6 +268,10 @@ def test_one_bad_file_does_not_stop_the_others(
         (["convert", "bush.glb", "-o", "out", "--max-error", "nan"], 2, "--max-error"),
         (["convert", "bush.glb", "-o", "out", "--max-pixels", "0"], 2, "--max-pixels"),
         (["convert", "bush.glb", "-o", "out", "--views", "below"], 2, "below"),
+        (["convert", "bush.glb", "-o", "out", "--shadow-proxy", "1"], 2, "--shadow-proxy: expec"),
+        (["convert", "bush.glb", "-o", "out", "--scene", "none.toml"], 2, "none.toml: cannot"),
+        (["convert", "bush.glb", "-o", "out", "--scene", ""], 2, "empty"),
+        (["convert", "bush.glb", "-o", "out", "--scene", "plant.fbx"], 2, "expected TOML"),
         (
             ["convert", "bush.glb", "-o", "out", "--measure", "off", "--max-error", "0.1"],
             2,
@@ -407,11 +473,13 @@ def test_a_file_in_place_of_the_folder_is_said_before_the_work(
 
 
 def test_levels_of_an_earlier_run_are_no_models(tmp_path: Path) -> None:
-    for name in ("oak.glb", "oak_LOD1.glb", "oak_LOD2.glb", "oak.lod.json", "mine_LOD1.glb"):
-        (tmp_path / name).touch()
-    assert [job.name for job in find_jobs([tmp_path])] == ["mine_LOD1", "oak"]
-    with pytest.raises(UsageError, match="same name"):
-        find_jobs([tmp_path / "oak.glb", tmp_path / "oak_LOD1.glb"])
+    for name in ("oak", "oak_LOD1", "oak_LOD2", "oak_shadow", "mine_LOD1", "my_shadow"):
+        (tmp_path / f"{name}.glb").touch()
+    (tmp_path / "oak.lod.json").touch()
+    assert [job.name for job in find_jobs([tmp_path])] == ["mine_LOD1", "my_shadow", "oak"]
+    for other in ("oak_LOD1.glb", "oak_shadow.glb"):
+        with pytest.raises(UsageError, match="same name"):
+            find_jobs([tmp_path / "oak.glb", tmp_path / other])
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="file names need not be Unicode on Linux only")

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 from vegtool.convert import ConvertOptions, convert
 from vegtool.errors import InputError, UsageError, VegtoolError, unknown
 from vegtool.formats import READERS, ReadOptions, read_plant
-from vegtool.lod import LodChain
+from vegtool.lod import LodChain, ShadowProxy
 from vegtool.measure.options import MeasureOptions
 from vegtool.progress import Progress, silent
 
@@ -39,7 +39,8 @@ class Job:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a job: files and their bytes, a row per level, notes; or the error.
+    """What came of a job: files and their bytes, a row per level, a row on what throws the shadow,
+    notes; or the error.
 
     After a dry run the files are those that would be written. misses: where levels are worse than
     they were to be; the files are written all the same.
@@ -48,6 +49,7 @@ class Outcome:
     job: Job
     files: dict[str, int] = field(default_factory=dict)
     levels: tuple[dict[str, Any], ...] = ()
+    shadow: dict[str, Any] | None = None
     notes: tuple[str, ...] = ()
     misses: tuple[str, ...] = ()
     seconds: float = 0.0
@@ -67,6 +69,7 @@ class Task:
     measure: MeasureOptions = field(default_factory=MeasureOptions)
     force: bool = False
     depth: bool = False
+    packed: bool = False
     dry_run: bool = False
     inputs: tuple[Path, ...] = ()
     """The other files of the batch: like a job's own, they and what lies beside them are kept."""
@@ -127,7 +130,8 @@ def convert_file(job: Job, task: Task, progress: Progress = silent) -> Outcome:
     progress("reading", 0.0)
     plant = read_plant(job.source, task.read)
     sheet_name = f"{job.name}.png"
-    names = [*file_names(job.name, 1 + task.convert.levels, task.depth), sheet_name]
+    levels, casts = 1 + task.convert.levels, task.convert.shadow_proxy is not None
+    names = [*file_names(job.name, levels, task.depth, task.packed, casts), sheet_name]
     inputs = (job.source, *task.inputs)
     check_free(task.folder, names, task.force, inputs)
     chain = convert(plant, task.convert, task.measure, lambda s, f: progress(s, 0.05 + 0.8 * f))
@@ -137,13 +141,18 @@ def convert_file(job: Job, task: Task, progress: Progress = silent) -> Outcome:
     extra = {sheet_name: contact_sheet(chain)}
     progress("writing", 0.9)
     with TemporaryDirectory() if task.dry_run else nullcontext(task.folder) as folder:
-        paths = write_chain(chain, Path(folder), task.force, task.depth, extra, inputs)
+        paths = write_chain(chain, Path(folder), task.force, task.depth, extra, inputs, task.packed)
         files = {str(task.folder / p.name): p.stat().st_size for p in paths}
     progress("done", 1.0)
     rows = tuple(_row(chain, i) for i in range(len(chain.levels)))
     notes = (*plant.notes, *chain.notes)
+    if task.packed and not any(
+        level.atlas and level.atlas.light is not None for level in chain.levels
+    ):
+        notes = (*notes, _NOTHING_TO_PACK)
     missed = tuple(misses(chain.levels, task.measure))
-    return Outcome(job, files, rows, notes, missed, perf_counter() - start)
+    shadow = None if chain.shadow is None else _shadow_row(chain.shadow)
+    return Outcome(job, files, rows, shadow, notes, missed, perf_counter() - start)
 
 
 def convert_files(
@@ -180,6 +189,10 @@ def convert_files(
             raise
 
 
+_NOTHING_TO_PACK = (
+    "--packed: no level has light beside its colours to write; --occlusion and --translucency give"
+    " it some, --prelit takes it"
+)
 _WORKER_DIED = (
     "the process that converted it, or one beside it, was ended from outside, mostly for want of"
     " memory; fewer files at a time (-j) need less"
@@ -235,8 +248,8 @@ def _uninterrupted() -> Iterator[None]:
 
 
 def _plant_of_level(name: str) -> str | None:
-    """oak, where the name is that of a level of an oak: oak_LOD1."""
-    found = re.fullmatch(r"(.+)_lod\d+", name, re.IGNORECASE | re.DOTALL)
+    """oak, where the name is that of a level of an oak, oak_LOD1, or of its shadow, oak_shadow."""
+    found = re.fullmatch(r"(.+)_(?:lod\d+|shadow)", name, re.IGNORECASE | re.DOTALL)
     return found[1] if found else None
 
 
@@ -287,4 +300,18 @@ def _row(chain: LodChain, index: int) -> dict[str, Any]:
         "flip": None if measured is None else round(measured.errors["flip"].mean, 4),
         "live_flip": None if measured is None else round(measured.live["flip"].mean, 4),
         "seconds": {k: round(v, 4) for k, v in level.seconds.items()},
+    }
+
+
+def _shadow_row(shadow: ShadowProxy) -> dict[str, Any]:
+    bias = shadow.errors["coverage_bias"]
+    return {
+        "triangles": shadow.level.triangles,
+        "texels": shadow.level.texels,
+        "suns": shadow.suns,
+        "pixels": shadow.pixels,
+        "coverage_bias": round(bias.mean, 4),
+        "worst_coverage_bias": round(bias.high if bias.high > -bias.low else bias.low, 4),
+        "silhouette": round(shadow.errors["silhouette"].mean, 4),
+        "live_silhouette": round(shadow.live["silhouette"].mean, 4),
     }

@@ -88,6 +88,24 @@ def convert_command(
     read: ReadOptions,
     jobs: Annotated[int, typer.Option("-j", "--jobs", help="Files at a time.", min=1)] = 1,
     depth: Annotated[bool, typer.Option("--depth", help="Write depth textures too.")] = False,
+    packed: Annotated[
+        bool,
+        typer.Option(
+            "--packed",
+            help="Write packed light textures for engines too: sky visibility, thickness, "
+            "translucency.",
+        ),
+    ] = False,
+    scene: Annotated[
+        Path | None,
+        typer.Option(
+            "--scene",
+            help="A scene file: its light, and its camera where --fov and --image-height are not "
+            "given.",
+            metavar="FILE.toml",
+            parser=_path,
+        ),
+    ] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be made.")] = False,
     force: Force = False,
     json: Json = False,
@@ -109,9 +127,19 @@ def convert_command(
     from vegtool.outcomes import as_summary, summary_text
 
     console = Console(-1 if quiet else verbose, json)
+    if scene is not None:
+        from vegtool.scene import read_scene, unused, with_scene
+
+        described = read_scene(scene)
+        convert = with_scene(convert, described)
+        for note in unused(described):
+            console.say(note)
     todo = find_jobs(inputs)
     sources = tuple(job.source for job in todo)
-    task = Task(out, read, convert, measure, force, depth, dry_run, sources)
+    task = Task(
+        out, read, convert, measure, force,
+        depth=depth, packed=packed, dry_run=dry_run, inputs=sources,
+    )  # fmt: skip
     outcomes = []
     with console.bar("convert") as progress:
         for outcome in convert_files(todo, task, jobs, _file_progress(todo, progress)):

@@ -148,6 +148,13 @@ class ConvertOptions:
         least=0.0,
         most=1.0,
     )
+    shadow_proxy: int | None = option(
+        None,
+        "Make something of at most so many triangles to throw the plant's shadow too.",
+        least=TRIANGLES_PER_BILLBOARD,
+        most=TRIANGLES_PER_BILLBOARD * MOST_BILLBOARDS,
+        metavar="TRIANGLES",
+    )
     max_texture: int = option(
         BakeOptions().max_texture, "Largest side of an atlas, in texels.", least=16, most=16384
     )
@@ -236,6 +243,7 @@ def convert(
             rounded_up(distance_of(plant, options.display, pixels))
             for pixels in (size, NEAR_LIMITS[0])
         )
+        first = near
         for index, count in enumerate(counts):
 
             def report(stage: str, fraction: float, index: int = index) -> None:
@@ -247,6 +255,17 @@ def convert(
             saves = level.triangles <= MOST_OF_PREVIOUS * levels[-1].triangles
             if saves or (index == len(counts) - 1 and len(levels) == 1):
                 levels.append(level)
+        shadow = None
+        if options.shadow_proxy is not None:
+            from vegtool.refine.shadow_proxy import shadow_proxy
+
+            most = min(options.shadow_proxy // TRIANGLES_PER_BILLBOARD, most_billboards(plant))
+            shadow = shadow_proxy(
+                plant,
+                options.display,
+                lambda near_m: make(most, near_m, lambda stage, _: progress(stage, making)),
+                first,
+            )
         kept, notes = with_distances(
             plant,
             levels[1:],
@@ -261,14 +280,21 @@ def convert(
             notes = (*notes, *coverage_notes(kept, truth_at))
     progress("levels", 1.0)
     told = {**asdict(options), **asdict(measure)}
-    levels = [levels[0], *kept]
-    if sun is None:
-        return LodChain(plant.name, tuple(levels), options.display, options.seed, told, notes)
-    if sun.elevation_deg < 0:
-        below = "the sun is below the horizon: the levels' colours have the sky's light alone"
-        notes = (*notes, below)
+    baked: dict[str, float] = {}
+    if sun is not None:
+        baked = sun.as_dict()
+        if sun.elevation_deg < 0:
+            below = "the sun is below the horizon: the levels' colours have the sky's light alone"
+            notes = (*notes, below)
     return LodChain(
-        plant.name, tuple(levels), options.display, options.seed, told, notes, sun.as_dict()
+        plant.name,
+        (levels[0], *kept),
+        options.display,
+        options.seed,
+        told,
+        notes,
+        baked,
+        shadow,
     )
 
 
@@ -298,7 +324,9 @@ def level_maker(buffers: PlantBuffers, truth_at: TruthsAt, options: ConvertOptio
     from vegtool.gl.pictures import BakedLight
 
     under = truth_at.under
-    lit = None if under is None else BakedLight(under.light, under.shadows)
+    lit = None
+    if under is not None and under.shadows is not None:
+        lit = BakedLight(under.light, under.shadows)
     if options.refine == "none":
         return partial(billboard_level, buffers, options, lit)
     from vegtool.refine.level import Wanted, refined_level, source_of
@@ -364,9 +392,13 @@ def billboard_level(
 
 def billboard_counts(plant: Plant, options: ConvertOptions) -> list[int]:
     """Planes per level, finest first: half each time, never more than the plant can use."""
-    most = int(MOST_OF_PREVIOUS * len(plant.faces) / TRIANGLES_PER_BILLBOARD)
-    first = min(options.billboards, max(1, most))
+    first = min(options.billboards, most_billboards(plant))
     return [max(1, round(first / LEVEL_RATIO**i)) for i in range(options.levels)]
+
+
+def most_billboards(plant: Plant) -> int:
+    """More planes than these save none of the plant's triangles that is worth it."""
+    return max(1, int(MOST_OF_PREVIOUS * len(plant.faces) / TRIANGLES_PER_BILLBOARD))
 
 
 def near_pixels(count: int) -> float:

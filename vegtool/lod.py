@@ -251,6 +251,22 @@ class Level:
 
 
 @dataclass(frozen=True, eq=False)
+class ShadowProxy:
+    """What throws a plant's shadow with few triangles (refine/shadow_proxy.py).
+
+    level: white, unlit and without normal texture. errors: by metric, coverage_bias and silhouette,
+    of how it looks from `suns` suns, the plant's longest extent `pixels` large. live: the same of
+    the original as a client draws it.
+    """
+
+    level: Level
+    pixels: float
+    suns: int
+    errors: dict[str, Spread]
+    live: dict[str, Spread]
+
+
+@dataclass(frozen=True, eq=False)
 class LodChain:
     """All levels of a plant: levels[0] is the original, then coarser and coarser.
 
@@ -258,6 +274,7 @@ class LodChain:
     notes: sentences for the user: levels that were left out, and why.
     baked: the light in the levels' colours, as plain values for the manifest; empty where clients
     light them.
+    shadow: what throws the plant's shadow in place of its levels, or None.
     """
 
     name: str
@@ -267,6 +284,7 @@ class LodChain:
     options: dict[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     baked: dict[str, float] = field(default_factory=dict)
+    shadow: ShadowProxy | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,7 @@ def as_summary(outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
             "source": str(outcome.job.source),
             "files": outcome.files,
             "levels": list(outcome.levels),
+            "shadow": outcome.shadow,
             "notes": list(outcome.notes),
             "misses": list(outcome.misses),
             "seconds": round(outcome.seconds, 3),
@@ -38,7 +39,19 @@ def _block(outcome: Outcome, dry_run: bool) -> str:
     title = f"{outcome.job.name}: {outcome.seconds:.1f} s, {total}"
     title += " would be written" if dry_run else ""
     files = [f"  {path}  {human_bytes(size)}" for path, size in outcome.files.items()]
-    return "\n".join([title, table(head, rows), *files])
+    return "\n".join([title, table(head, rows), *_shadow_line(outcome.shadow), *files])
+
+
+def _shadow_line(row: dict[str, Any] | None) -> list[str]:
+    """What is said of that which throws the shadow, where there is something."""
+    if row is None:
+        return []
+    return [
+        f"shadow: {row['triangles']:,} triangles; seen from {row['suns']} suns, {row['pixels']:g} "
+        f"pixels large, coverage bias {row['coverage_bias']:+.1%} "
+        f"({row['worst_coverage_bias']:+.1%} at worst), silhouette error {row['silhouette']} "
+        f"(live {row['live_silhouette']})"
+    ]
 
 
 def _cell(value: Any) -> str:

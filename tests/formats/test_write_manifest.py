@@ -9,12 +9,12 @@ from pathlib import Path
 
 import jsonschema
 import pytest
-from written import hybrid_level, small_chain
+from written import billboard_level, hybrid_level, parse, small_chain
 
 from vegtool.errors import InputError
-from vegtool.formats.gltf import screen_coverage, write_chain
+from vegtool.formats.gltf import file_names, screen_coverage, write_chain
 from vegtool.formats.manifest import LevelFile, manifest, read_manifest, schema
-from vegtool.lod import FADE_FRACTION, LodChain, Measured, Spread
+from vegtool.lod import FADE_FRACTION, LodChain, Measured, ShadowProxy, Spread
 
 FILES = [LevelFile("tree.glb", 300), LevelFile("tree_LOD1.glb", 200), LevelFile("tree_LOD2.glb", 9)]
 
@@ -120,6 +120,59 @@ def test_what_was_written_reads_back(tmp_path: Path):
     ]
     for entry in (values["combined"], *values["levels"]):
         assert (tmp_path / entry["file"]).stat().st_size == entry["bytes"]
+
+
+def test_the_light_in_colours_is_stated_where_there_is_some() -> None:
+    sun = {"azimuth_deg": 90.0, "elevation_deg": 30.0, "sun": 0.7, "sky_above": 0.4}
+    sun["sky_below"] = 0.2
+    values = manifest(small_chain(baked=sun), FILES)
+    jsonschema.validate(values, schema())
+    assert values["sun"] == sun
+    assert "sun" not in manifest(small_chain(), FILES)
+
+
+def with_shadow() -> LodChain:
+    """The small chain, and a caster of three billboards of 16 x 32 texels."""
+    level = billboard_level(3)
+    assert level.atlas is not None
+    level = replace(level, unlit=True, atlas=replace(level.atlas, normal=None))
+    bias, outline = Spread(-0.0123456, 0.02, -0.05, 0.03), Spread(0.2, 0.01, 0.19, 0.21)
+    errors = {"coverage_bias": bias, "silhouette": outline, "flip": Spread(0.9, 0, 0.9, 0.9)}
+    return small_chain(shadow=ShadowProxy(level, 100.0, 12, errors, errors))
+
+
+def test_what_throws_the_shadow_is_a_file_of_its_own(tmp_path: Path) -> None:
+    paths = write_chain(with_shadow(), tmp_path)
+    assert {path.name for path in paths} == set(file_names("tree", 3, shadow=True))
+    values = read_manifest(tmp_path / "tree.lod.json")
+    jsonschema.validate(values, schema())
+    data = (tmp_path / "tree_shadow.glb").read_bytes()
+    spreads = {
+        "coverage_bias": {"mean": -0.0123, "sd": 0.02, "low": -0.05, "high": 0.03},
+        "silhouette": {"mean": 0.2, "sd": 0.01, "low": 0.19, "high": 0.21},
+    }
+    assert values["shadow"] == {
+        "file": "tree_shadow.glb",
+        "triangles": 6,
+        "texels": 16 * 32,
+        "bytes": len(data),
+        "pixels": 100.0,
+        "suns": 12,
+        **spreads,
+        "live": spreads,
+    }
+    glb = parse(data)
+    assert [node["name"] for node in glb.json["nodes"]] == ["tree_shadow"]
+    assert "normalTexture" not in glb.material() and "KHR_materials_unlit" in str(glb.material())
+    assert "tree_shadow" not in parse((tmp_path / "tree.glb").read_bytes()).json["nodes"][0]["name"]
+
+
+def test_without_a_shadow_there_is_neither_file_nor_key(tmp_path: Path) -> None:
+    write_chain(small_chain(), tmp_path)
+    assert "shadow" not in read_manifest(tmp_path / "tree.lod.json")
+    assert not (tmp_path / "tree_shadow.glb").exists()
+    with pytest.raises(ValueError, match="needs its file"):
+        manifest(with_shadow(), FILES)
 
 
 def broken(change) -> bytes:

@@ -110,7 +110,8 @@ def write_chain(
     inputs: Iterable[Path] = (),
     packed: bool = False,
 ) -> list[Path]:
-    """Write NAME_LOD1.glb, ..., NAME.glb (all levels), NAME.lod.json and `extra`: all or none.
+    """Write NAME_LOD1.glb, ..., NAME.glb (all levels), NAME_shadow.glb where the chain has one,
+    NAME.lod.json and `extra`: all or none.
 
     depth: also NAME_LOD1_depth.png, ...: 16 bit grey, as Atlas.depth.
     extra: bytes of further files by name, which appear with the others.
@@ -136,14 +137,22 @@ def write_chain(
         data = chain_glb(chain, images)
         combined = LevelFile(f"{chain.name}.glb", len(data))
         files.add(combined.name, data)
+        shadow = None
+        if chain.shadow is not None:
+            name = f"{chain.name}_shadow"
+            data = level_glb(chain.shadow.level, name, images)
+            shadow = LevelFile(f"{name}.glb", len(data))
+            files.add(shadow.name, data)
         for name, data in (extra or {}).items():
             files.add(name, data)
-        text = encode(manifest(chain, [combined, *levels]))
+        text = encode(manifest(chain, [combined, *levels], shadow))
         files.add(f"{chain.name}.lod.json", text)
         return files.paths
 
 
-def file_names(name: str, levels: int, depth: bool = False, packed: bool = False) -> list[str]:
+def file_names(
+    name: str, levels: int, depth: bool = False, packed: bool = False, shadow: bool = False
+) -> list[str]:
     """The files that `write_chain` may write for a chain of that many levels, the original counted.
 
     Images beside them (depth, packed) are written of the levels that have them.
@@ -151,7 +160,8 @@ def file_names(name: str, levels: int, depth: bool = False, packed: bool = False
     lower = [f"{name}_LOD{index}" for index in range(1, levels)]
     endings = [".glb", *(["_depth.png"] if depth else []), *(["_leaf.png"] if packed else [])]
     beside = [f"{each}{ending}" for ending in endings for each in lower]
-    return [*beside, f"{name}.glb", f"{name}.lod.json"]
+    caster = [f"{name}_shadow.glb"] if shadow else []
+    return [*beside, *caster, f"{name}.glb", f"{name}.lod.json"]
 
 
 def level_name(chain: LodChain, index: int) -> str:

@@ -15,12 +15,14 @@ from typing import Any
 
 import vegtool
 from vegtool.errors import InputError
-from vegtool.lod import FADE_FRACTION, Level, LodChain, Measured, Spread
+from vegtool.lod import FADE_FRACTION, Level, LodChain, Measured, ShadowProxy, Spread
 
 VERSION = 1  # of the schema: one more when a reader of the last one would misread the file
 DECIMALS = 4  # of an error
 STATED = ("flip", "ssim", "coverage_bias", "color_bias")
 """Metrics that a manifest tells of each level."""
+OF_SHADOW = ("coverage_bias", "silhouette")
+"""Metrics that it tells of what throws the shadow."""
 
 _AGAIN = "Convert the plant again."
 _TYPES: dict[str, tuple[type, ...]] = {
@@ -45,8 +47,11 @@ class LevelFile:
     leaf: str | None = None
 
 
-def manifest(chain: LodChain, files: Sequence[LevelFile]) -> dict[str, Any]:
-    """The manifest of a chain whose levels were written to `files`, one for each level, in order.
+def manifest(
+    chain: LodChain, files: Sequence[LevelFile], shadow: LevelFile | None = None
+) -> dict[str, Any]:
+    """The manifest of a chain whose levels were written to `files`, one for each level, in order,
+    and what throws its shadow to `shadow`.
 
     The first is the combined file, which shows the original wherever MSFT_lod is not read.
     Distances are for `chain.display`; errors are null where they were not measured. The same chain
@@ -64,6 +69,8 @@ def manifest(chain: LodChain, files: Sequence[LevelFile]) -> dict[str, Any]:
         "extent_m": extent(chain),
         "options": chain.options,
         "combined": {"file": files[0].name, "bytes": files[0].bytes},
+        **({"sun": chain.baked} if chain.baked else {}),
+        **({} if chain.shadow is None else {"shadow": _shadow(chain.shadow, shadow)}),
         "levels": [
             _level(chain, level, file) for level, file in zip(chain.levels, files, strict=True)
         ],
@@ -94,6 +101,21 @@ def _level(chain: LodChain, level: Level, file: LevelFile) -> dict[str, Any]:
     }
 
 
+def _shadow(proxy: ShadowProxy, file: LevelFile | None) -> dict[str, Any]:
+    if file is None:
+        raise ValueError("manifest: a chain with a shadow needs its file")
+    return {
+        "file": file.name,
+        "triangles": proxy.level.triangles,
+        "texels": proxy.level.texels,
+        "bytes": file.bytes,
+        "pixels": proxy.pixels,
+        "suns": proxy.suns,
+        **_spreads(proxy.errors, OF_SHADOW),
+        "live": _spreads(proxy.live, OF_SHADOW),
+    }
+
+
 def _measured(measured: Measured) -> dict[str, Any]:
     """The errors at the switch distance."""
     held_out = measured.held_out
@@ -106,11 +128,13 @@ def _measured(measured: Measured) -> dict[str, Any]:
     }
 
 
-def _spreads(errors: dict[str, Spread]) -> dict[str, dict[str, float]]:
-    """The metrics of STATED, rounded: more digits than the views vouch for are noise."""
+def _spreads(
+    errors: dict[str, Spread], stated: Sequence[str] = STATED
+) -> dict[str, dict[str, float]]:
+    """The metrics `stated`, rounded: more digits than the views vouch for are noise."""
     return {
         name: {key: round(value, DECIMALS) + 0.0 for key, value in asdict(errors[name]).items()}
-        for name in STATED
+        for name in stated
         if name in errors
     }
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 from weakref import WeakKeyDictionary
@@ -36,7 +36,7 @@ class Shot:
 
 
 def draw(
-    buffers: PlantBuffers,
+    buffers: PlantBuffers | Sequence[PlantBuffers],
     shot: Shot,
     light: Light,
     supersample: int = 1,
@@ -44,7 +44,7 @@ def draw(
     anisotropy: int = ANISOTROPY,
     shadows: SunMaps | None = None,
 ) -> Picture:
-    """The picture of a plant or level.
+    """The picture of a plant or level, or of several that stand together.
 
     supersample: samples per axis and pixel, averaged; mip-mapped textures are filtered as for one
     of the whole pixel, so that the mean is that of pictures moved by parts of a pixel. samples: of
@@ -53,12 +53,15 @@ def draw(
     to be drawn; light comes from their direction then. Raises CapabilityError where OpenGL cannot
     multisample so, or cannot hold the plant or the picture.
     """
-    ctx = buffers.ctx
+    drawn_together = (buffers,) if isinstance(buffers, PlantBuffers) else tuple(buffers)
+    ctx = drawn_together[0].ctx
     picture = np.empty((shot.height, shot.width, 4), np.float32)
     with framebuffer_kept(ctx):
         for x, y, part in tiles(ctx, shot, supersample):
             size = (0, 0, part.width, part.height)
-            drawn = draw_tile(buffers, part, light, supersample, samples, anisotropy, shadows)
+            drawn = draw_tile(
+                drawn_together, part, light, supersample, samples, anisotropy, shadows
+            )
             data = drawn.frame.read(size, components=4, dtype="f4")
             pixels = np.frombuffer(data, np.float32).reshape(part.height, part.width, 4)
             picture[y : y + part.height, x : x + part.width] = pixels
@@ -79,7 +82,7 @@ def tiles(ctx: moderngl.Context, shot: Shot, supersample: int) -> Iterator[tuple
 
 
 def draw_tile(
-    buffers: PlantBuffers,
+    buffers: Sequence[PlantBuffers],
     shot: Shot,
     light: Light,
     supersample: int,
@@ -89,11 +92,12 @@ def draw_tile(
 ) -> Target:
     """Draw a picture that a target can hold; what is returned has it in its lower left corner,
     top row first. The caller keeps the framebuffer (`framebuffer_kept`)."""
-    ctx = buffers.ctx
+    ctx = buffers[0].ctx
     size = supersample * shot.width, supersample * shot.height
     drawn = drawing_target(ctx, size, samples)
     begin(drawn, size)
-    render(buffers, shot, light, supersample, anisotropy, shadows)
+    for each in buffers:
+        render(each, shot, light, supersample, anisotropy, shadows)
     return _resolved(ctx, drawn, (shot.width, shot.height), supersample, samples)
 
 

@@ -29,9 +29,9 @@ SUN_DEPTH = 5
 class SunMaps:
     """What the sun sees of some plants, on the GPU. A context manager: leaving releases.
 
-    casters: what throws shadows; those without mipmaps, as they are. direction: (3,) towards the
-    sun. suns: points of its disc; one throws sharp shadows. side: texels of a map. Raises
-    CapabilityError where OpenGL cannot draw.
+    casters: what throws shadows, plants and levels alike, cut out by their alpha. direction: (3,)
+    towards the sun. suns: points of its disc; one throws sharp shadows. side: texels of a map.
+    Raises CapabilityError where OpenGL cannot draw.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class SunMaps:
         low = np.min([c.plant.bounds[0] for c in casters], axis=0)
         high = np.max([c.plant.bounds[1] for c in casters], axis=0)
         self.center: FloatArray = (low + high) / 2
-        self.radius = max(float(np.linalg.norm(high - low)) / 2, np.finfo(float).tiny)
+        self.radius = float(np.linalg.norm(high - low)) / 2 or 1.0
         # a texel free all around, so that what lies outside is lit
         half = self.radius * self.side / (self.side - 2)
         self.projection = projections(disc(self.direction, suns), half)
@@ -85,7 +85,9 @@ class SunMaps:
         shader["sun_depth"] = SUN_DEPTH
         shader["sun_side"] = self.side
         matrices = [self._placed(matrix, receiver).T for matrix in self.projection]
-        shader["to_sun"] = np.array(matrices).reshape(-1, 16).tolist()
+        uniform = shader["to_sun"]
+        assert isinstance(uniform, moderngl.Uniform)
+        uniform.write(np.array(matrices, np.float32).tobytes())  # one matrix is no list of them
         shader["sun_texel"] = self.texel_m / receiver.scale
         shader["sun_bias"] = BIAS
 
@@ -131,7 +133,8 @@ class SunMaps:
             plain = () if group.material.color_texture is not None else ("NO_COLOR_MAP",)
             shader = program(self.ctx, "camera.vert", "depth.frag", *plain)
             shader["view_projection"] = placed
-            texels_per_metre = 1 / self.texel_m
-            caster.use(group, shader, point_sampled=caster.minified(group, texels_per_metre))
+            # no mips here: they lose leaves, and the shadow is to be theirs
+            sharp = caster.mipmaps or caster.minified(group, 1 / self.texel_m)
+            caster.use(group, shader, point_sampled=sharp)
             array = caster.vertex_array(shader)
             array.render(vertices=3 * group.count, first=3 * group.first)

@@ -29,7 +29,7 @@ def time_frames(
         for i in range(len(seconds)):
             since = perf_counter()
             for _, _, part in tiles(ctx, shot, 1):
-                draw_tile(buffers, part, light, 1, samples)
+                draw_tile((buffers,), part, light, 1, samples)
             ctx.finish()
             seconds[i] = perf_counter() - since
         check(ctx)

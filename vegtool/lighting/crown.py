@@ -61,7 +61,12 @@ def ellipsoid_normals(plant: Plant, faces: np.ndarray, points: FloatArray) -> Fl
     middle = weight @ plant.face_centroids[faces]
     off = (plant.face_centroids[faces] - middle) / (plant.radius or 1.0)
     values, axes = np.linalg.eigh(np.einsum("f,fi,fj->ij", weight, off, off))
-    values = np.maximum(values, THINNEST**2 * max(values[-1], np.finfo(float).tiny))
+    if values[-1] < np.finfo(float).eps ** 2:  # one leaf: a ball about it
+        values = np.ones(3)
+    thinnest = THINNEST**2 * values[-1]
+    if values[0] < thinnest <= values[1]:
+        return np.tile(axes[:, 0], (len(points), 1))
+    values = np.maximum(values, thinnest)
     local = ((points - middle) / (plant.radius or 1.0)) @ axes
     normal = unit((local / values) @ axes.T)
     return np.where(np.any(normal, axis=1, keepdims=True), normal, np.array([0.0, 1.0, 0.0]))

@@ -51,8 +51,10 @@ def shaded(
     toward = normal @ light.unit
     near, far = (1.0, 1.0) if exposure is None else (exposure[..., 0], exposure[..., 1])
     here = light.sun * np.asarray(visible) * np.maximum(toward, 0) + sky_light(normal, light) * near
+    share = np.asarray(transmission, np.float64)
+    if not share.any():
+        return np.asarray(color * here[..., None])
     behind = light.sun * np.asarray(through) * np.maximum(-toward, 0)
     behind = behind + sky_light(-normal, light) * far
-    share = np.asarray(transmission, np.float64)
     passed = (share * behind)[..., None] * np.asarray(tint, np.float64)
     return np.asarray(color * (((1 - share) * here)[..., None] + passed))

@@ -19,12 +19,13 @@ float sun_visible(vec3 position, vec3 side) {
         ivec2 first = ivec2(floor(texel));
         vec2 share = texel - vec2(first);
         ivec2 corner = sun_side * ivec2(i % SUNS_ACROSS, i / SUNS_ACROSS);
+        float from_sun = min(at.z, 1.0);  // what lies behind all that is in the map
         vec4 lit;
         for (int k = 0; k < 4; ++k) {
             ivec2 place = first + ivec2(k & 1, k >> 1);
             bool outside = any(lessThan(place, ivec2(0))) || any(greaterThanEqual(place, ivec2(sun_side)));
             float depth = outside ? 1.0 : texelFetch(sun_depth, corner + place, 0).x;
-            lit[k] = at.z <= depth ? 1.0 : 0.0;
+            lit[k] = from_sun <= depth ? 1.0 : 0.0;
         }
         total += mix(mix(lit.x, lit.y, share.x), mix(lit.z, lit.w, share.x), share.y);
     }

@@ -82,11 +82,12 @@ def sun_visible(positions: FloatArray, sides: FloatArray, maps: SunDepths) -> Fl
         texel = at[:, :2] * side - 0.5
         first = np.floor(texel).astype(np.int64)
         share = texel - first
+        from_sun = np.minimum(at[:, 2], 1.0)  # what lies behind all that is in the map
         for dx, dy in ((0, 0), (1, 0), (0, 1), (1, 1)):
             x, y = first[:, 0] + dx, first[:, 1] + dy
             outside = (x < 0) | (y < 0) | (x >= side) | (y >= side)
             stored = depth[np.clip(y, 0, side - 1), np.clip(x, 0, side - 1)]
-            lit = outside | (at[:, 2] <= stored)
+            lit = outside | (from_sun <= stored)
             weight = (share[:, 0] if dx else 1 - share[:, 0]) * (
                 share[:, 1] if dy else 1 - share[:, 1]
             )

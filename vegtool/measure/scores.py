@@ -39,10 +39,10 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True, eq=False)
 class Shadowed:
-    """A light that does not move, and what its sun sees."""
+    """A light that does not move, and what its sun sees; None where it throws no shadows."""
 
     light: Light
-    shadows: SunMaps
+    shadows: SunMaps | None
 
 
 @dataclass(frozen=True, eq=False)

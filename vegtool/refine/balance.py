@@ -15,7 +15,7 @@ problems, 1970), solved by its dual, which is as large as there are views and su
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -34,12 +34,16 @@ from vegtool.refine.color import BRIGHTER, LEAST_GAIN, MOST_GAIN
 from vegtool.refine.retouch import elements_of, retouched
 
 LEANS = (1.0, 0.85, 0.7, 0.55, 0.4, 0.25)
-HEIGHTS = (1.0, 0.9, 0.8, 0.7, 0.6)
+HEIGHTS = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4)
 """Of bends, tried one after the other, and each until it gets worse."""
+FEWER = 4
+"""One in so many views and suns is enough for bends."""
 RIDGE = 1.0
 """Of the mean square of what views show: what it costs to change a colour or a normal."""
 MOST_TURN = 0.5
 """Radians."""
+FINE = 1024
+"""Elements; of more, every second, third, ... sun is enough, and the matrix stays small."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,15 +74,15 @@ def balanced(level: Level, plant: Plant, wanted: Brightness) -> Level:
     and triangles changed, each by itself.
 
     Seen from where it may be used on. plant: what it is made of. A level whose light is in its
-    colours has those changed alone. Raises CapabilityError where OpenGL cannot draw.
+    colours stays as it is: it looks the same from both sides of the light, and gains that follow
+    what does not would only make it patchy. Raises CapabilityError where OpenGL cannot draw.
     """
+    if level.unlit:
+        return level
     samples = _samples(level, plant, wanted)
     known = (samples.count > 0) & (wanted.values > 0).all(axis=1)
     if not known.any():
         return level
-    if level.unlit:
-        gain, _ = ridge(_unlit(samples, wanted, known), None)
-        return retouched(level, gain, np.zeros((len(gain), 3)))
     bend = best_bend(level, samples, wanted, known)
     samples = replace(samples, normal=bent(samples.normal, samples.plane, bend, samples.pictured))
     gain, turn = ridge(*_matrices(samples, wanted, known))
@@ -89,11 +93,17 @@ def best_bend(level: Level, samples: Samples, wanted: Brightness, known: np.ndar
     """The bend of LEANS and HEIGHTS at which brightness is nearest to the plant's, but for one
     factor."""
 
+    few = replace(wanted, lights=wanted.lights[::FEWER], values=wanted.values[:, ::FEWER])
+    some = _of(samples, samples.view % FEWER == 0)
+    known = known & (some.count > 0)
+
     def error(bend: Bend) -> float:
-        normal = bent(samples.normal, samples.plane, bend, samples.pictured)
-        found = _brightness(replace(samples, normal=normal), wanted)[known] / wanted.values[known]
+        normal = bent(some.normal, some.plane, bend, some.pictured)
+        found = _brightness(replace(some, normal=normal), few)[known] / few.values[known]
         return float(found.std() / found.mean())
 
+    if not known.any():
+        return Bend()
     best, least = Bend(), error(Bend())
     mapped = level.atlas is not None and level.atlas.normal is not None
     for name, values in (("lean", LEANS[1:] * mapped), ("height", HEIGHTS[1:])):
@@ -105,18 +115,16 @@ def best_bend(level: Level, samples: Samples, wanted: Brightness, known: np.ndar
     return best
 
 
-def ridge(shown: FloatArray, turning: FloatArray | None) -> tuple[FloatArray, FloatArray]:
+def ridge(shown: FloatArray, turning: FloatArray) -> tuple[FloatArray, FloatArray]:
     """(e,) gains and (e, 3) turns with which the rows of (m, e), and of (m, 3 e), their change by
     turns about x, y, z, come nearer to sums of BRIGHTER."""
     count = shown.shape[1]
-    matrix = shown if turning is None else np.concatenate([shown, turning], axis=1)
+    matrix = np.concatenate([shown, turning], axis=1)
     square = matrix @ matrix.T
     cost = RIDGE * max(float(np.trace(square)) / len(square), np.finfo(float).tiny)
     missing = BRIGHTER - shown.sum(axis=1)
     change = matrix.T @ np.linalg.solve(square + cost * np.eye(len(square)), missing)
     gain = np.clip(1 + change[:count], LEAST_GAIN, MOST_GAIN)
-    if turning is None:
-        return gain, np.zeros((count, 3))
     turn = change[count:].reshape(3, count).T
     angle = np.linalg.norm(turn, axis=1, keepdims=True)
     return gain, turn * np.minimum(1.0, MOST_TURN / np.maximum(angle, MOST_TURN))
@@ -165,6 +173,17 @@ def _samples(level: Level, plant: Plant, wanted: Brightness) -> Samples:
     )
 
 
+def _of(samples: Samples, some: np.ndarray) -> Samples:
+    """Those of the samples, (n,) bool, of views of which all are."""
+    arrays = {
+        item.name: getattr(samples, item.name)[some]
+        for item in fields(Samples)
+        if item.name not in ("elements", "count")
+    }
+    count = np.bincount(samples.view[some], minlength=len(samples.count))
+    return replace(samples, count=count.astype(np.int32), **arrays)
+
+
 def _light(samples: Samples, light: Light) -> FloatArray:
     """(n,) luminance of samples under a light."""
     albedo = samples.albedo[:, None]
@@ -190,28 +209,24 @@ def _matrices(
     normals about x, y and z, (m, 3 e), as shares of what the plant's is; a row for each view that
     is known under each light."""
     shown, turning = [], []
-    for number, light in enumerate(wanted.lights):
+    step = 1 + samples.elements // FINE
+    for number, light in list(enumerate(wanted.lights))[::step]:
         lit = _light(samples, light)
         toward = samples.normal @ light.unit
         front = light.sun * (1 - samples.transmission) * (toward > 0)
         back = -light.sun * samples.transmission * samples.exposure[:, 1] * (toward < 0)
         pull = samples.albedo * front + samples.tinted * back
-        slope = (light.sky_above - light.sky_below) / 2 * samples.albedo
+        here = samples.albedo * (1 - samples.transmission) * samples.exposure[:, 0]
+        behind = samples.tinted * samples.transmission * samples.exposure[:, 1]
+        slope = (light.sky_above - light.sky_below) / 2 * (here - behind)
         moment = pull[:, None] * np.cross(samples.normal, light.unit)
-        moment += (slope * samples.exposure[:, 0])[:, None] * np.cross(
-            samples.normal, np.array([0.0, 1.0, 0.0])
-        )
+        moment += slope[:, None] * np.cross(samples.normal, np.array([0.0, 1.0, 0.0]))
         true = wanted.values[:, number]
         shown.append(_rows(samples, lit, true)[known])
         turning.append(
             np.concatenate([_rows(samples, axis, true)[known] for axis in moment.T], axis=1)
         )
     return np.concatenate(shown), np.concatenate(turning)
-
-
-def _unlit(samples: Samples, wanted: Brightness, known: np.ndarray) -> FloatArray:
-    """(m, e) the same of a level that shows its colours as they are."""
-    return _rows(samples, samples.albedo, wanted.values[:, 0])[known]
 
 
 def _rows(samples: Samples, values: FloatArray, true: FloatArray) -> FloatArray:

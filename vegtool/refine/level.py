@@ -93,7 +93,7 @@ class Source:
     @cached_property
     def brightness(self) -> Brightness:
         """What the plant's is from all around."""
-        return brightness_of(self.truth_at.buffers, self.truth_at.display, self.truth_at.under)
+        return brightness_of(self.truth_at.buffers, self.truth_at.display)
 
     @cached_property
     def stems(self) -> Stems | None:
@@ -161,9 +161,10 @@ def refined_level(source: Source, wanted: Wanted, progress: Progress = silent) -
         with timed(seconds, "foliage"):
             made = better(source, wanted, made, as_triangles(source, wanted, wood, left))
     level = replace(made.level, near_distance_m=wanted.near_m)
-    progress("balance", 0.9)
-    with timed(seconds, "balance"):
-        level = balanced(level, source.plant, source.brightness)
+    if source.lit is None:
+        progress("balance", 0.9)
+        with timed(seconds, "balance"):
+            level = balanced(level, source.plant, source.brightness)
     with timed(seconds, "error"):
         error = geometric_error(
             source.plant, made.labels, level.billboards, level.mesh, made.by_mesh

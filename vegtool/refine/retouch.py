@@ -28,9 +28,9 @@ def elements_of(level: Level) -> IntArray:
     mesh: list[IntArray] = []
     if level.mesh is not None:
         for index in np.unique(level.mesh.face_material):
-            own = np.flatnonzero(level.mesh.face_material == index)
+            own = np.flatnonzero(level.mesh.face_material == index).astype(np.int32)
             twice = level.mesh.materials[index].double_sided and not level.double_sided
-            mesh += [own.astype(np.int32)] * (2 if twice else 1)
+            mesh += [own, own[::-1]] if twice else [own]  # as `level_triangles` has them
     return np.concatenate([quads, *(count + own for own in mesh)]).astype(np.int32)
 
 
@@ -56,7 +56,7 @@ def _pictures(atlas: Atlas, billboards: Billboards, gain: FloatArray, turn: Floa
     normal = None if atlas.normal is None else atlas.normal.copy()
     sides = [(atlas.front, 1.0)]
     if not np.array_equal(atlas.front, atlas.back):
-        sides.append((atlas.back, -1.0))
+        sides.insert(0, (atlas.back, -1.0))  # of a picture for both sides, the front's counts
     rects = np.concatenate([rect for rect, _ in sides])
     grown = rects + np.array([-GUTTER, -GUTTER, 2 * GUTTER, 2 * GUTTER], np.int32)
     owner = owners(color.shape[:2], np.maximum(grown, 0))
@@ -88,7 +88,7 @@ def _mesh(mesh: Plant, gain: FloatArray, turn: FloatArray) -> Plant:
     if mesh.colors is None:
         return mesh
     colors = mesh.colors.copy()
-    colors[:, :3] = np.clip(colors[:, :3] * mean(gain)[:, None], 0.0, 1.0)
+    colors[:, :3] = np.clip(colors[:, :3] * (1 + mean(gain - 1))[:, None], 0.0, 1.0)
     return replace(mesh, colors=colors)
 
 

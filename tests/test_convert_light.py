@@ -1,0 +1,198 @@
+"""What the pipeline does with light: baked into colours, let through by leaves, kept out by them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vegtool.convert import ConvertOptions, as_lit, convert
+from vegtool.errors import UsageError
+from vegtool.formats.gltf import level_glb
+from vegtool.growth import sample
+from vegtool.lighting.light import Sun
+from vegtool.lod import Level, LodChain
+from vegtool.measure.options import MeasureOptions
+from vegtool.plant import Plant
+
+pytestmark = pytest.mark.gl
+OPTIONS = ConvertOptions(billboards=30, levels=2)
+BY_RULE = MeasureOptions(measure="off")
+SUN = "60,40"
+
+
+@pytest.fixture(scope="module")
+def bush() -> Plant:
+    return sample("bush", 800)
+
+
+@pytest.fixture(scope="module", params=["full", "none"])
+def options(request: pytest.FixtureRequest) -> ConvertOptions:
+    return replace(OPTIONS, refine=request.param)
+
+
+@pytest.fixture(scope="module")
+def prelit(bush: Plant, options: ConvertOptions) -> LodChain:
+    return convert(bush, replace(options, prelit=True, sun=SUN), BY_RULE)
+
+
+@pytest.fixture(scope="module")
+def unlit(bush: Plant, options: ConvertOptions) -> LodChain:
+    return convert(bush, options, BY_RULE)
+
+
+def test_light_that_is_baked_needs_a_sun_and_a_sun_needs_to_be_baked(bush: Plant) -> None:
+    with pytest.raises(UsageError, match=r"--prelit: .* --sun"):
+        convert(bush, replace(OPTIONS, prelit=True), BY_RULE)
+    with pytest.raises(UsageError, match=r"--sun: .* --prelit"):
+        replace(OPTIONS, sun=SUN)
+    with pytest.raises(UsageError, match=r"--sun: .*azimuth"):
+        replace(OPTIONS, prelit=True, sun="noon")
+    assert replace(OPTIONS, prelit=True, sun=SUN).baked_sun == Sun(60, 40)
+    assert OPTIONS.baked_sun is None
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("occlusion", -0.1), ("occlusion", 1.5), ("translucency", 2.0), ("crown_normals", -1.0)],
+)
+def test_shares_lie_between_nothing_and_all(bush: Plant, name: str, value: float) -> None:
+    flag = "--" + name.replace("_", "-")
+    with pytest.raises(UsageError, match=flag):
+        convert(bush, replace(OPTIONS, **{name: value}), BY_RULE)
+
+
+def test_a_level_with_its_light_needs_no_normals_and_no_light_of_a_client(prelit: LodChain) -> None:
+    assert len(prelit.levels) > 1
+    assert not prelit.levels[0].unlit
+    for level in prelit.levels[1:]:
+        assert level.unlit
+        if level.atlas is not None:
+            assert level.atlas.normal is None and level.atlas.light is None
+        if level.mesh is not None:
+            assert all(m.unlit and not m.transmission for m in level.mesh.materials)
+            assert level.mesh.exposure is None
+
+
+def test_it_says_of_which_sun(prelit: LodChain, unlit: LodChain) -> None:
+    assert prelit.baked == Sun(60, 40).as_dict()
+    assert prelit.options["sun"] == SUN and prelit.options["prelit"] is True
+    assert unlit.baked == {}
+    assert not any("horizon" in note for note in prelit.notes)
+
+
+def test_it_costs_half_the_texels_at_most(
+    prelit: LodChain, unlit: LodChain, options: ConvertOptions
+) -> None:
+    """Colours alone, where there were colours and normals. Which levels there are is decided by
+    error where leaves may be triangles, so those of one kind are compared."""
+    pairs = list(zip(prelit.levels[1:], unlit.levels[1:], strict=False))
+    same = [(a, b) for a, b in pairs if a.atlas is not None and b.atlas is not None]
+    assert same or options.refine == "full"
+    for a, b in same:
+        assert a.texels <= b.texels / 2
+    if options.refine == "none":
+        assert sum(a.texels for a, _ in pairs) <= sum(b.texels for _, b in pairs) / 2
+
+
+def test_the_same_bytes_twice(bush: Plant, prelit: LodChain, options: ConvertOptions) -> None:
+    again = convert(bush, replace(options, prelit=True, sun=SUN), BY_RULE)
+    for one, two in zip(prelit.levels[1:], again.levels[1:], strict=True):
+        assert level_glb(one, "level") == level_glb(two, "level")
+
+
+def test_another_sun_gives_other_colours(
+    bush: Plant, prelit: LodChain, options: ConvertOptions
+) -> None:
+    other = convert(bush, replace(options, prelit=True, sun="240,40"), BY_RULE)
+    for one, two in zip(prelit.levels[1:], other.levels[1:], strict=False):
+        assert level_glb(one, "level") != level_glb(two, "level")
+
+
+def test_below_the_horizon_there_is_a_note_and_the_sky_alone(
+    bush: Plant, prelit: LodChain, options: ConvertOptions
+) -> None:
+    night = convert(bush, replace(options, prelit=True, sun="60,-10", levels=1), BY_RULE)
+    assert any("horizon" in note for note in night.notes)
+    assert night.baked["sun"] == 0 and night.baked["elevation_deg"] == -10
+    assert brightness(night.levels[1]) < brightness(prelit.levels[1])
+
+
+def brightness(level: Level) -> float:
+    """Mean byte of the colours of what is covered, or of vertices."""
+    if level.atlas is not None:
+        return float(level.atlas.color[level.atlas.color[..., 3] > 127][:, :3].mean())
+    assert level.mesh is not None and level.mesh.colors is not None
+    return float(255 * level.mesh.colors[:, :3].mean())
+
+
+@pytest.fixture(scope="module")
+def soft(bush: Plant, options: ConvertOptions) -> LodChain:
+    lit = replace(options, occlusion=1.0, translucency=0.4)
+    if options.refine == "full":  # large enough that leaves are pictures
+        lit = replace(lit, pixels=400.0, levels=1)
+    return convert(bush, lit, BY_RULE)
+
+
+def test_what_leaves_let_through_and_keep_out_reaches_pictures(soft: LodChain) -> None:
+    level = soft.levels[1]
+    assert level.atlas is not None and level.atlas.light is not None
+    shown = level.atlas.light[level.atlas.color[..., 3] > 127].astype(int)
+    assert np.ptp(shown[:, 0]) > 50 and np.ptp(shown[:, 1]) > 50
+    assert np.median(shown[:, 3]) == pytest.approx(0.4 * 255, abs=1), "most of it is leaves"
+    assert shown[:, 3].max() <= 0.4 * 255 + 1
+    assert not level.unlit
+
+
+def test_the_first_level_is_the_plant_with_what_was_said_of_its_light(
+    soft: LodChain, bush: Plant
+) -> None:
+    mesh = soft.levels[0].mesh
+    assert mesh is not None and mesh.exposure is not None
+    assert mesh.exposure.min() < 0.5 and mesh.exposure.max() > 0.9
+    shares = {m.role: m.transmission for m in mesh.materials}
+    assert shares == {"leaf": 0.4, "wood": 0.0}
+    assert bush.exposure is None and not any(m.transmission for m in bush.materials)
+
+
+def test_it_reaches_leaves_that_are_triangles_too(bush: Plant) -> None:
+    """For small sizes a refined level is a mesh; where it is, its leaves have their share."""
+    lit = replace(OPTIONS, occlusion=1.0, translucency=0.4, pixels=24.0, billboards=64, levels=1)
+    level = convert(bush, lit, BY_RULE).levels[1]
+    assert level.kind == "mesh" and level.mesh is not None
+    assert level.mesh.exposure is not None
+    assert level.mesh.exposure.min() < 0.6
+    shares = [m.transmission for m in level.mesh.materials]
+    assert max(shares) == pytest.approx(0.4)
+
+
+def test_without_a_word_the_file_says(bush: Plant) -> None:
+    thin = tuple(replace(m, transmission=0.25) for m in bush.materials)
+    plant = replace(bush, materials=thin)
+    assert as_lit(plant, OPTIONS) is plant
+    assert [m.transmission for m in as_lit(plant, replace(OPTIONS, translucency=0.0)).materials]
+    told = as_lit(plant, replace(OPTIONS, translucency=0.0))
+    for material in told.materials:
+        assert material.transmission == (0.0 if material.role == "leaf" else 0.25)
+
+
+def test_half_of_the_occlusion_is_half_of_it_and_with_baked_light_all(bush: Plant) -> None:
+    half, full, baked = (
+        as_lit(bush, replace(OPTIONS, **how)).exposure  # type: ignore[arg-type]
+        for how in ({"occlusion": 0.5}, {"occlusion": 1.0}, {"prelit": True, "sun": SUN})
+    )
+    assert half is not None and full is not None and baked is not None
+    np.testing.assert_allclose(half, (1 + full) / 2)
+    np.testing.assert_array_equal(baked, full)
+
+
+def test_crown_normals_are_those_of_the_levels_alone(bush: Plant) -> None:
+    """The original that they are compared with keeps its own."""
+    plain = replace(OPTIONS, refine="none", levels=1)
+    one, two = (convert(bush, replace(plain, crown_normals=s), BY_RULE) for s in (0.0, 1.0))
+    assert two.levels[0].mesh is bush
+    a, b = one.levels[1].atlas, two.levels[1].atlas
+    assert a is not None and b is not None and a.normal is not None and b.normal is not None
+    if a.normal.shape == b.normal.shape:
+        assert (a.normal != b.normal).mean() > 0.1
