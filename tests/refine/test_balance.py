@@ -10,19 +10,13 @@ import pytest
 from hybrids import hybrid_of
 
 from vegtool.arrays import FloatArray, unit
-from vegtool.baking.bake import bake
-from vegtool.boxes import BoxOptions, make_billboards
-from vegtool.clustering import cluster
 from vegtool.gl.draw import draw
-from vegtool.gl.pictures import BakedLight
-from vegtool.gl.sun import SunMaps
 from vegtool.gl.upload import PlantBuffers
 from vegtool.growth import sample
 from vegtool.lighting.leaves import translucent
-from vegtool.lighting.light import Light, Sun
+from vegtool.lighting.light import Light
 from vegtool.lod import Display, Level
 from vegtool.measure.pictures import client_plant, shot_of
-from vegtool.measure.scores import Shadowed
 from vegtool.measure.views import around, views
 from vegtool.plant import Material, Plant
 from vegtool.refine.balance import (
@@ -32,7 +26,6 @@ from vegtool.refine.balance import (
     Samples,
     _brightness,
     _matrices,
-    _unlit,
     balanced,
     best_bend,
     ridge,
@@ -110,11 +103,14 @@ def test_views_that_show_nothing_count_for_nothing() -> None:
     assert not all_rows[3::4].any()
 
 
-def test_what_is_unlit_shows_its_colours_alone() -> None:
-    samples, wanted = random_samples(1), made_brightness(3, (Light(),))
-    rows = _unlit(samples, wanted, np.ones(3, dtype=bool))
-    means = [samples.albedo[samples.view == v].mean() for v in range(3)]
-    np.testing.assert_allclose(rows.sum(axis=1), means / wanted.values[:, 0])
+def test_of_many_elements_fewer_suns_are_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every second one here."""
+    samples, wanted = random_samples(2), made_brightness(3, LIGHTS)
+    every, _ = _matrices(samples, wanted, np.ones(3, dtype=bool))
+    monkeypatch.setattr("vegtool.refine.balance.FINE", 5)
+    fewer, turning = _matrices(samples, wanted, np.ones(3, dtype=bool))
+    np.testing.assert_array_equal(fewer, every.reshape(3, 3, 5)[::2].reshape(6, 5))
+    assert turning.shape == (6, 15)
 
 
 def parts(rows: int, elements: int, seed: int = 0) -> FloatArray:
@@ -129,21 +125,16 @@ def test_where_nothing_is_wrong_nothing_changes() -> None:
     gain, turn = ridge(shown, turning)
     np.testing.assert_allclose(gain, 1.0, atol=1e-12)
     np.testing.assert_allclose(turn, 0.0, atol=1e-12)
-    gain, turn = ridge(shown, None)
-    np.testing.assert_allclose(gain, 1.0, atol=1e-12)
-    assert turn.shape == (6, 3) and not turn.any()
 
 
-@pytest.mark.parametrize("turns", [False, True])
-def test_a_level_too_bright_from_one_side_gets_closer(turns: bool) -> None:
+@pytest.mark.parametrize("turns", [0.0, 0.1])
+def test_a_level_too_bright_from_one_side_gets_closer(turns: float) -> None:
     """10 %; and as a whole it gets no worse."""
     shown = parts(20, 6)
     shown[3] *= 1.1
-    turning = generator(1, "turning").normal(size=(20, 18)) * 0.1 if turns else None
+    turning = generator(1, "turning").normal(size=(20, 18)) * turns
     gain, turn = ridge(shown, turning)
-    after = shown @ gain
-    if turning is not None:
-        after = after + turning @ turn.T.ravel()
+    after = shown @ gain + turning @ turn.T.ravel()
     before = shown.sum(axis=1)
     assert abs(after[3] - BRIGHTER) < 0.9 * abs(before[3] - BRIGHTER)
     assert np.linalg.norm(after - BRIGHTER) < np.linalg.norm(before - BRIGHTER)
@@ -165,9 +156,10 @@ def test_it_is_the_least_of_errors_and_changes_together() -> None:
 
 def test_changes_have_limits() -> None:
     """An element that shows a hundredth of what it should, or a hundred times it."""
-    gain, _ = ridge(np.full((3, 1), 0.01), None)
+    none = np.zeros((3, 3))
+    gain, _ = ridge(np.full((3, 1), 0.01), none)
     assert gain == pytest.approx(MOST_GAIN)
-    gain, _ = ridge(np.full((3, 1), 100.0), None)
+    gain, _ = ridge(np.full((3, 1), 100.0), none)
     assert gain == pytest.approx(LEAST_GAIN)
     turning = np.concatenate([np.full((3, 1), 0.02), np.zeros((3, 2))], axis=1)
     _, turn = ridge(np.full((3, 1), 1e-3), turning)
@@ -189,10 +181,10 @@ class Tree:
         return self.buffers.plant
 
 
-def few_views(buffers: PlantBuffers, under: Shadowed | None = None) -> Brightness:
+def few_views(buffers: PlantBuffers) -> Brightness:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("vegtool.refine.brightness.VIEWS", FEW)
-        return brightness_of(buffers, Display(), under)
+        return brightness_of(buffers, Display())
 
 
 @pytest.fixture(scope="module")
@@ -283,27 +275,9 @@ def test_the_plant_itself_needs_hardly_any_change(tree: Tree) -> None:
 
 
 @pytest.mark.gl
-def test_a_level_with_its_light_in_its_colours_has_those_changed_alone() -> None:
-    plant = sample("broadleaf", 2000)
-    light = Sun(60, 40).light
-    density = PIXELS / plant.extent
-    labels = cluster(plant, "kmeans", 60)
-    planes = make_billboards(plant, labels, BoxOptions(shape="single", plane="orientation"))
-    with PlantBuffers(plant) as buffers, SunMaps([buffers], light.direction) as maps:
-        level = bake(buffers, labels, planes, density, lit=BakedLight(light, maps))
-        level = replace(level, near_distance_m=Display().distance_m(density))
-        assert level.unlit and level.atlas is not None
-        wanted = few_views(buffers, Shadowed(light, maps))
-        assert wanted.values.shape == (FEW, 1)
-        assert wanted.lights == (light,)
-        found = balanced(scaled(level, 0.8, 1.0), plant, wanted)
-        one_sided, other = (
-            luminances(drawn(one, wanted.cameras, [light] * FEW)) / wanted.values[:, 0]
-            for one in (scaled(level, 0.8, 1.0), found)
-        )
-    assert found.atlas is not None and found.atlas.normal is None and found.unlit
-    assert np.abs(other - BRIGHTER).mean() < np.abs(one_sided - BRIGHTER).mean()
-    np.testing.assert_array_equal(found.atlas.color[..., 3], level.atlas.color[..., 3])
+def test_a_level_with_its_light_in_its_colours_stays(tree: Tree) -> None:
+    unlit = replace(tree.level, unlit=True)
+    assert balanced(unlit, tree.plant, tree.wanted) is unlit
 
 
 @pytest.mark.gl
@@ -320,6 +294,15 @@ def test_a_level_of_which_nothing_is_seen_stays(tree: Tree) -> None:
 def test_a_black_plant_is_no_measure(tree: Tree) -> None:
     black = replace(tree.wanted, values=np.zeros_like(tree.wanted.values))
     assert balanced(tree.level, tree.plant, black) is tree.level
+
+
+@pytest.mark.gl
+def test_a_level_that_is_black_is_left_to_be_so(tree: Tree) -> None:
+    """No factor makes it brighter."""
+    black = scaled(tree.level, 0.0, 0.0)
+    found = balanced(black, tree.plant, few_views(tree.buffers))
+    assert found.mesh is not None and found.mesh.colors is not None
+    assert not found.mesh.colors[:, :3].any()
 
 
 def test_the_bend_that_was_wrong_is_found() -> None:
