@@ -35,8 +35,8 @@ WHITE = 4
 """Texels: side of a white block. In the middle of four, mips 0 and 1 are white wherever it lies."""
 FLAT = (128, 128, 255)
 """A normal that points straight out."""
-ALL_OF_THE_SKY = (255, 255, 0, 0)
-"""What `Atlas.light` says of wood that is drawn as a mesh."""
+ALL_OF_THE_SKY = np.ones(2)
+"""The exposure of what nothing hides."""
 
 
 def bake(
@@ -78,7 +78,8 @@ def bake(
         double_sided = options.sides == "double" or (
             options.sides == "auto" and not opposite_needed(billboards, sides)
         )
-        behind = np.flatnonzero(sides.differ & (not double_sided)).astype(np.int32)
+        apart = sides.differ | (lit is not None)  # light differs from side to side
+        behind = np.flatnonzero(apart & (not double_sided)).astype(np.int32)
     progress("bake", 0.2)
     with timed(seconds, "pack"):
         half_size = np.concatenate([billboards.half_size, billboards.half_size[behind]])
@@ -110,7 +111,7 @@ def bake(
         color, normal, light = dilated(drawn, packing, options.fit_alpha)
         block = packing.rect[-1] if white else None
         if block is not None:
-            whiten(color, normal, light, block, options.gutter)
+            whiten(color, normal, light, block, options.gutter, _exposure(plant.plant, labels < 0))
         tint = transmission_tint(plant.plant)
         atlas = Atlas(color, normal, drawn.depth, front, back, block, light, tint)
     progress("bake", 1.0)
@@ -205,16 +206,26 @@ def whiten(
     light: ByteArray | None,
     block: IntArray,
     gutter: int,
+    exposure: FloatArray = ALL_OF_THE_SKY,
 ) -> None:
     """Paint a block (4,) of an atlas, and its gutter, opaque white and facing straight out, with
-    all of the sky's light and none that passes through."""
+    an exposure, (2,), and no light that passes through."""
     x, y, w, h = block.tolist()
     painted = np.s_[y - gutter : y + h + gutter, x - gutter : x + w + gutter]
     color[painted] = 255
     if normal is not None:
         normal[painted] = FLAT
     if light is not None:
-        light[painted] = ALL_OF_THE_SKY
+        light[painted] = [*np.rint(255 * exposure), 0, 0]
+
+
+def _exposure(plant: Plant, faces: np.ndarray) -> FloatArray:
+    """(2,) mean exposure of some faces, (f,) bool: of the wood that is drawn as a mesh, which shows
+    one place of the atlas all over."""
+    area = plant.face_areas * faces
+    if plant.exposure is None or not area.sum() > 0:
+        return ALL_OF_THE_SKY
+    return np.asarray(area @ plant.exposure[plant.faces].mean(axis=1) / area.sum())
 
 
 def has_light(plant: Plant) -> bool:
