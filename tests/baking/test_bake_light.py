@@ -12,7 +12,6 @@ from baking_cases import billboards, leafy, plain, quads, texture
 
 from vegtool.arrays import FloatArray
 from vegtool.baking.bake import (
-    ALL_OF_THE_SKY,
     WHITE,
     BakeOptions,
     bake,
@@ -141,10 +140,21 @@ def test_the_white_block_has_all_of_the_sky_and_lets_nothing_through(transmissio
     assert atlas is not None and atlas.light is not None and atlas.white is not None
     x, y, w, h = atlas.white
     assert w == h == WHITE
-    assert (atlas.light[y - 2 : y + h + 2, x - 2 : x + w + 2] == ALL_OF_THE_SKY).all()
+    assert (atlas.light[y - 2 : y + h + 2, x - 2 : x + w + 2] == [255, 255, 0, 0]).all()
     px, py, pw, ph = atlas.front[0]
     inside = atlas.light[py : py + ph, px : px + pw].astype(int)
     assert np.abs(inside - [64, 191, 0, round(255 * transmission)]).max() <= 1
+
+
+def test_the_white_block_has_the_exposure_of_what_no_billboard_shows() -> None:
+    """The wood, which is a mesh beside the billboards and shows the block all over."""
+    plant = quads([[0, 0, 0], [0, 0, 5]], materials=(leaf(), leaf()))
+    exposure = np.repeat([[1.0, 1.0], [0.2, 0.6]], 4, axis=0)
+    labels = np.array([0, 0, -1, -1], dtype=np.int32)
+    atlas = bake(replace(plant, exposure=exposure), labels, BOARD, 8.0, white=True).atlas
+    assert atlas is not None and atlas.light is not None and atlas.white is not None
+    x, y, _, _ = atlas.white
+    assert atlas.light[y, x].tolist() == [51, 153, 0, 0]
 
 
 def test_the_tint_is_that_of_most_of_the_light_that_passes() -> None:
