@@ -12,7 +12,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from platform import system
-from typing import Any
+from types import TracebackType
+from typing import Any, Self
 from weakref import WeakKeyDictionary
 
 import moderngl
@@ -27,6 +28,25 @@ LINUX_PACKAGES = (
     ("zypper", "sudo zypper install Mesa-libEGL1 Mesa-libGL1 Mesa-dri"),
     ("apk", "sudo apk add mesa-egl mesa-gl mesa-dri-gallium"),
 )
+
+
+class OnGpu:
+    """What holds something on the GPU: a context manager, leaving which releases it."""
+
+    def release(self) -> None:
+        """Free everything on the GPU."""
+        raise NotImplementedError
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.release()
 
 
 @dataclass(frozen=True)

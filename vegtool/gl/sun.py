@@ -7,13 +7,12 @@ all points of the sun lie side by side in one texture, which any OpenGL can hold
 from __future__ import annotations
 
 from collections.abc import Sequence
-from types import TracebackType
 
 import moderngl
 import numpy as np
 
 from vegtool.arrays import FloatArray
-from vegtool.gl.context import check, describe, framebuffer_kept
+from vegtool.gl.context import OnGpu, check, describe, framebuffer_kept
 from vegtool.gl.program import program
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lighting.shadow import BIAS, SUNS, SunDepths, disc, projections
@@ -26,7 +25,7 @@ SUN_DEPTH = 5
 """Texture unit."""
 
 
-class SunMaps:
+class SunMaps(OnGpu):
     """What the sun sees of some plants, on the GPU. A context manager: leaving releases.
 
     casters: what throws shadows, plants and levels alike, cut out by their alpha. direction: (3,)
@@ -58,17 +57,6 @@ class SunMaps:
         self.texture.compare_func = ""  # read as a number
         self.texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._draw(casters)
-
-    def __enter__(self) -> SunMaps:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.release()
 
     def release(self) -> None:
         """Free it on the GPU."""

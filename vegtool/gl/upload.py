@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from types import TracebackType
 from typing import TypeVar
 
 import moderngl
@@ -17,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vegtool.arrays import ByteArray, FloatArray
-from vegtool.gl.context import context, describe
+from vegtool.gl.context import OnGpu, context, describe
 from vegtool.gl.mipmaps import mip_levels
 from vegtool.plant import Material, Plant, Texture
 
@@ -53,7 +52,7 @@ class MaterialGroup:
     light_map: moderngl.Texture | None
 
 
-class PlantBuffers:
+class PlantBuffers(OnGpu):
     """A plant's vertices, indices and textures on the GPU. A context manager: leaving releases.
 
     origin, scale: (3,) and metres: what is uploaded (float32) is relative to the origin, in units
@@ -81,17 +80,6 @@ class PlantBuffers:
         self._owned: list[moderngl.Buffer | moderngl.Texture | moderngl.VertexArray] = []
         self._arrays: dict[moderngl.Program, moderngl.VertexArray] = {}
         self.groups = self._material_groups()
-
-    def __enter__(self) -> PlantBuffers:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.release()
 
     def release(self) -> None:
         """Free everything on the GPU."""

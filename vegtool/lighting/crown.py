@@ -17,7 +17,7 @@ from vegtool.plant import Plant
 THINNEST = 1e-2
 """Of the crown's longest axis: what is flatter has normals across it and no others."""
 TIED = 1e-6
-"""Cosine: a leaf that looks into the crown by less lies along it, and rounding is not to turn it."""
+"""Cosine: a leaf that looks into the crown by less lies along it; rounding is not to turn it."""
 
 
 def crown_normals(plant: Plant, share: float) -> Plant:

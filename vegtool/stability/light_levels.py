@@ -1,4 +1,4 @@
-"""Levels and their light at the limits: balanced, and with the light of one sun in their colours."""
+"""Levels and their light at the limits: balanced, or with the light of one sun in their colours."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from vegtool.convert import ConvertOptions
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lighting.light import Light
 from vegtool.lod import Level
-from vegtool.plant import Plant
+from vegtool.plant import Plant, Role
 from vegtool.refine.balance import balanced
 from vegtool.refine.brightness import brightness_of
 from vegtool.refine.color import LEAST_GAIN, MOST_GAIN
 from vegtool.srgb import linear_from_srgb
 from vegtool.stability.cameras import plate
-from vegtool.stability.case import Case, Outcome, drawn, holds, same_objective
+from vegtool.stability.case import Case, Outcome, holds, same_objective
 from vegtool.stability.clustering import DEGENERATE
 from vegtool.stability.convert import PLAIN, REFINED, levels_of, same
 from vegtool.stability.plants import MOTIONS, Motion, soup, tree
@@ -41,12 +41,14 @@ def bush() -> Plant:
 def of_colour(plant: Plant, linear: float) -> Plant:
     """The plant in one grey, without textures."""
     color = np.array([linear, linear, linear, 1.0])
-    bare = {"base_color": color, "color_texture": None, "normal_texture": None}
-    materials = tuple(replace(m, alpha_mode="opaque", **bare) for m in plant.materials)
+    materials = tuple(
+        replace(m, base_color=color, color_texture=None, normal_texture=None, alpha_mode="opaque")
+        for m in plant.materials
+    )
     return replace(plant, materials=materials, colors=None)
 
 
-def of_role(plant: Plant, role: str) -> Plant:
+def of_role(plant: Plant, role: Role) -> Plant:
     """The plant, all of it wood or all of it leaves."""
     return replace(plant, materials=tuple(replace(m, role=role) for m in plant.materials))
 
@@ -115,7 +117,9 @@ def balanced_twice(made: Callable[[], Plant]) -> Outcome:
             length = np.linalg.norm(one.mesh.normals, axis=1)
             wrong += int((~(length < 1 + 1e-9)).sum())
             wrong += not np.array_equal(one.mesh.positions, level.mesh.positions)
-    return holds(wrong, "finite, within limits, twice the same", note=f"changes to {changed:.2f}")
+    return holds(
+        wrong, "finite, within limits, twice the same", note=f"changed by up to {changed:.3f}"
+    )
 
 
 def balanced_bytes(level: Level) -> list[npt.NDArray[np.uint8]]:
@@ -141,7 +145,8 @@ def balance_stays(motion: Motion) -> Outcome:
     note = f"{other} bytes differ, by {255 * max(float(a.max()) for a in apart):.0f} at most"
     error = float(np.abs(values / others - 1).max())
     if motion.offset:
-        return drawn(error + max(float(a.mean()) for a in apart), note=note)
+        error = max(error, *(float(a.mean()) for a in apart))
+        return Outcome(error, 1e-4, "a sample on an edge may fall to its other side", note=note)
     return same_objective(error + other, note=note)
 
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
+from math import cos, sin
 
 import numpy as np
 import numpy.typing as npt
 
-from vegtool.arrays import FloatArray
+from vegtool.arrays import FloatArray, unit
 from vegtool.plant import Material, Plant
 from vegtool.seeding import generator
 
@@ -93,6 +94,15 @@ def soup(corners: npt.ArrayLike) -> Plant:
     )
 
 
+def facing(normal: FloatArray, turn: float = 0.0) -> FloatArray:
+    """(3, 3) rows: two across a unit vector, turned about it by radians, and itself."""
+    across = unit(np.cross(normal, np.eye(3)[np.abs(normal).argmin()])[None])[0]
+    other = np.cross(normal, across)
+    return np.stack(
+        [cos(turn) * across + sin(turn) * other, cos(turn) * other - sin(turn) * across, normal]
+    )
+
+
 def facing_out(points: FloatArray, size: float) -> FloatArray:
     """(n, 3, 3) a small triangle at each of the unit vectors (n, 3), across it."""
     across = np.cross(points, np.eye(3)[np.abs(points).argmin(axis=1)])
@@ -138,3 +148,5 @@ def box_faces(half: tuple[float, float, float], even: bool = True) -> FloatArray
 
 
 SQUARE = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+SLOPE = facing(unit(np.array([[1.0, 2.0, 3.0]]))[0])
+"""(3, 3) axes along none of the world's: two of a slope, and its normal."""
