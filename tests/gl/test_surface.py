@@ -19,6 +19,8 @@ from vegtool.measure.views import Camera, around, direction
 from vegtool.plant import Material, Plant, Texture
 
 pytestmark = pytest.mark.gl
+HALF = 5e-4
+"""Normals and exposures are half floats: eleven bits."""
 TINT = np.array([0.9, 1.0, 0.25])
 LEAN = np.array([0.6, 0.0, 0.8])
 
@@ -112,9 +114,9 @@ def test_a_card_turns_its_normal_to_whoever_looks_by_the_side_of_the_face(back: 
     with PlantBuffers(plant) as buffers:
         seen = surface(buffers, front(back))
     expected = np.tile(-LEAN if back else LEAN, (len(seen.face), 1))
-    np.testing.assert_allclose(seen.normal, expected, atol=1e-6)
+    np.testing.assert_allclose(seen.normal, expected, atol=HALF)
     exposure = [0.25, 0.75] if back else [0.75, 0.25]
-    np.testing.assert_allclose(seen.exposure, np.tile(exposure, (len(seen.face), 1)), atol=1e-6)
+    np.testing.assert_allclose(seen.exposure, np.tile(exposure, (len(seen.face), 1)), atol=HALF)
 
 
 def test_a_normal_that_points_away_from_the_viewer_stays_so() -> None:
@@ -123,7 +125,7 @@ def test_a_normal_that_points_away_from_the_viewer_stays_so() -> None:
     plant = replace(plant, normals=np.tile([0.6, 0.0, -0.8], (4, 1)))
     with PlantBuffers(plant) as buffers:
         seen = surface(buffers, front())
-    np.testing.assert_allclose(seen.normal[:, 2], -0.8, atol=1e-6)
+    np.testing.assert_allclose(seen.normal[:, 2], -0.8, atol=HALF)
 
 
 def test_sides_are_normals_of_the_faces_themselves() -> None:
@@ -131,7 +133,7 @@ def test_sides_are_normals_of_the_faces_themselves() -> None:
     with PlantBuffers(plant) as buffers:
         seen = surface(buffers, front())
     cosine = (unit(plant.face_area_vectors)[seen.face] * seen.side).sum(axis=1)
-    np.testing.assert_allclose(np.abs(cosine), 1.0, atol=1e-4)
+    np.testing.assert_allclose(np.abs(cosine), 1.0, atol=2 * HALF)
 
 
 def test_single_sided_squares_are_not_there_from_behind() -> None:
@@ -176,9 +178,9 @@ def test_what_is_baked_of_light_multiplies_what_vertices_and_material_say() -> N
     plant = replace(squares((leaf,), [0]), exposure=np.tile([0.5, 1.0], (4, 1)))
     with PlantBuffers(plant) as buffers:
         seen, behind = (surface(buffers, front(back)) for back in (False, True))
-    assert seen.exposure == pytest.approx(np.tile([0.1, 0.4], (len(seen.face), 1)), abs=1e-5)
-    assert behind.exposure == pytest.approx(np.tile([0.4, 0.1], (len(behind.face), 1)), abs=1e-5)
-    assert seen.transmission == pytest.approx(0.4, abs=1e-5)
+    assert seen.exposure == pytest.approx(np.tile([0.1, 0.4], (len(seen.face), 1)), abs=HALF)
+    assert behind.exposure == pytest.approx(np.tile([0.4, 0.1], (len(behind.face), 1)), abs=HALF)
+    assert seen.transmission == pytest.approx(0.4, abs=HALF)
 
 
 def test_a_normal_texture_is_read_in_the_frame_of_the_texture() -> None:
@@ -190,7 +192,7 @@ def test_a_normal_texture_is_read_in_the_frame_of_the_texture() -> None:
         seen, behind = (surface(buffers, front(back)) for back in (False, True))
     assert seen.normal == pytest.approx(np.tile([0.6, 0, 0.8], (len(seen.face), 1)), abs=0.01)
     assert behind.normal == pytest.approx(np.tile([-0.6, 0, -0.8], (len(behind.face), 1)), abs=0.01)
-    np.testing.assert_allclose(np.linalg.norm(seen.normal, axis=1), 1.0, atol=1e-5)
+    np.testing.assert_allclose(np.linalg.norm(seen.normal, axis=1), 1.0, atol=2 * HALF)
 
 
 def noise(seed: int = 0) -> Texture:
@@ -234,7 +236,7 @@ def test_of_a_whole_tree_albedo_and_light_make_the_picture() -> None:
         seen = surface(buffers, shot)
         drawn = draw(buffers, shot, Light(sun=0.0, sky_above=1.0, sky_below=1.0))
     np.testing.assert_allclose(seen.picture(seen.color.astype(np.float64)), drawn, atol=1e-3)
-    np.testing.assert_allclose(np.linalg.norm(seen.normal, axis=1), 1.0, atol=1e-5)
+    np.testing.assert_allclose(np.linalg.norm(seen.normal, axis=1), 1.0, atol=2 * HALF)
     assert seen.face.min() >= 0 and seen.face.max() < len(plant.faces)
     roles = np.array([m.role for m in plant.materials])[plant.face_material[seen.face]]
     assert set(roles) == {"leaf", "wood"}

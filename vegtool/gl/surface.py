@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import moderngl
 import numpy as np
@@ -27,7 +28,8 @@ class Seen:
 
     at: (n, 2) int32 sample right and down, of `size`, width and height. face: (n,) int32 of the
     plant. color: (n, 3) linear albedo. normal: (n, 3) unit, turned to the viewer. position: (n, 3)
-    metres. side: (n, 3) unit normals of the faces themselves. exposure: (n, 2) of the viewer's
+    metres; none where they were not asked for. side: (n, 3) unit normals of the faces, of the side
+    that is seen. exposure: (n, 2) of the viewer's
     side and the other. transmission: (n,) share of light that passes through, times tint, (n, 3).
     """
 
@@ -52,48 +54,48 @@ class Seen:
         return result
 
 
+FORMATS = ("f4", "f2", "f2", "f4")
+"""Of what surface.frag writes."""
+_kept: WeakKeyDictionary[moderngl.Context, moderngl.Framebuffer] = WeakKeyDictionary()
+"""The last target of each context, which grows."""
+
+
 def surface(
     buffers: PlantBuffers,
     shot: Shot,
     supersample: int = 1,
     anisotropy: int = ANISOTROPY,
     footprint: float = 1.0,
+    places: bool = True,
 ) -> Seen:
     """What each sample of a picture shows; `supersample` of them per pixel and axis.
 
-    footprint: mip-mapped textures are filtered as for pixels so many times as wide. Drawn in one
-    piece. Raises CapabilityError where OpenGL cannot hold that.
+    footprint: mip-mapped textures are filtered as for pixels so many times as wide. places: whether
+    positions are wanted. Drawn in one piece. Raises CapabilityError where OpenGL cannot hold that.
     """
     ctx = buffers.ctx
     size = supersample * shot.width, supersample * shot.height
     samples_per_metre = supersample * pixels_per_metre(shot)
-    textures = [ctx.texture(size, 4, dtype="f4") for _ in range(4)]
-    depth = ctx.depth_renderbuffer(size)
-    frame = ctx.framebuffer(textures, depth)
-    try:
-        with framebuffer_kept(ctx):
-            frame.use()
-            frame.clear()
-            ctx.enable_only(moderngl.DEPTH_TEST)
-            for group in buffers.groups:
-                shader = shader_of(buffers, group, "surface.frag", anisotropy)
-                shader["view_projection"] = placed(buffers, shot)
-                shader["first_face"] = group.first
-                set_footprint(shader, supersample * footprint)
-                buffers.use(group, shader, point_sampled=buffers.minified(group, samples_per_metre))
-                render_group(buffers, group, shader)
-            ctx.disable(moderngl.CULL_FACE)
-            check(ctx)
-        planes = [
-            np.frombuffer(t.read(), np.float32).reshape(size[1], size[0], 4)[::-1] for t in textures
-        ]
-    finally:
-        frame.release()
-        depth.release()
-        for texture in textures:
-            texture.release()
+    frame = _target(ctx, size)
+    passing = any(m.transmission > 0 for m in buffers.plant.materials)
+    with framebuffer_kept(ctx):
+        frame.viewport = (0, 0, *size)
+        frame.use()
+        frame.clear(viewport=(0, 0, *size))
+        ctx.enable_only(moderngl.DEPTH_TEST)
+        for group in buffers.groups:
+            shader = shader_of(buffers, group, "surface.frag", anisotropy)
+            shader["view_projection"] = placed(buffers, shot)
+            shader["first_face"] = group.first
+            set_footprint(shader, supersample * footprint)
+            buffers.use(group, shader, point_sampled=buffers.minified(group, samples_per_metre))
+            render_group(buffers, group, shader)
+        ctx.disable(moderngl.CULL_FACE)
+        check(ctx)
+        planes = [_read(frame, i, size) for i in range(4 if places or passing else 3)]
     y, x = np.nonzero(planes[0][..., 3])
-    color, normal, position, side = (plane[y, x] for plane in planes)
+    color, normal, side, *rest = (plane[y, x].astype(np.float32) for plane in planes)
+    position = rest[0] if rest else np.zeros((0, 4), np.float32)
     face = buffers.face_order[color[:, 3].astype(np.int32) - 1]
     tints = np.array([m.transmission_tint for m in buffers.plant.materials], np.float32)
     return Seen(
@@ -104,7 +106,28 @@ def surface(
         normal[:, :3],
         position[:, :3].astype(np.float64) * buffers.scale + buffers.origin,
         side[:, :3],
-        np.stack([position[:, 3], side[:, 3]], axis=1),
-        normal[:, 3],
+        np.stack([normal[:, 3], side[:, 3]], axis=1),
+        position[:, 3] if passing else np.zeros(len(face), np.float32),
         tints[buffers.plant.face_material[face]],
     )
+
+
+def _target(ctx: moderngl.Context, size: tuple[int, int]) -> moderngl.Framebuffer:
+    """What is drawn into: at least `size` samples."""
+    kept = _kept.get(ctx)
+    if kept is not None:
+        if kept.width >= size[0] and kept.height >= size[1]:
+            return kept
+        size = max(kept.width, size[0]), max(kept.height, size[1])
+        for attached in (*kept.color_attachments, kept.depth_attachment, kept):
+            attached.release()
+    textures = [ctx.texture(size, 4, dtype=dtype) for dtype in FORMATS]
+    _kept[ctx] = ctx.framebuffer(textures, ctx.depth_renderbuffer(size))
+    return _kept[ctx]
+
+
+def _read(frame: moderngl.Framebuffer, attachment: int, size: tuple[int, int]) -> np.ndarray:
+    """(h, w, 4) of the lower left corner, top row first."""
+    dtype = FORMATS[attachment]
+    data = frame.read((0, 0, *size), 4, attachment=attachment, dtype=dtype)
+    return np.frombuffer(data, dtype).reshape(size[1], size[0], 4)[::-1]

@@ -19,7 +19,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from vegtool.arrays import FloatArray, IntArray, unit
+from vegtool.arrays import FloatArray, IntArray
 from vegtool.gl.surface import surface
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lighting.light import Light
@@ -136,14 +136,11 @@ def _samples(level: Level, plant: Plant, wanted: Brightness) -> Samples:
     pictures = 0 if level.atlas is None else len(level.atlas.front)
     pixels = plant.extent * wanted.display.pixels_per_metre(level.near_distance_m)
     parts: list[tuple[np.ndarray, ...]] = []
-    side = unit(drawn.face_area_vectors / plant.radius**2)
     with PlantBuffers(drawn, mipmaps=True) as buffers:
         for number, camera in enumerate(wanted.cameras):
             shot, footprint = shot_of(camera), PIXELS / pixels
-            seen = surface(buffers, shot, anisotropy=1, footprint=footprint)
+            seen = surface(buffers, shot, anisotropy=1, footprint=footprint, places=False)
             face, color = seen.face, seen.color.astype(np.float64)
-            plane = side[face]
-            away = ((camera.eye - seen.position) * plane).sum(axis=1, keepdims=True) < 0
             parts.append(
                 (
                     np.full(len(face), number),
@@ -151,7 +148,7 @@ def _samples(level: Level, plant: Plant, wanted: Brightness) -> Samples:
                     color @ LUMINANCE,
                     (color * seen.tint) @ LUMINANCE,
                     seen.normal.astype(np.float64),
-                    np.where(away, -plane, plane),
+                    seen.side.astype(np.float64),
                     seen.exposure.astype(np.float64),
                     seen.transmission.astype(np.float64),
                 )

@@ -53,7 +53,7 @@ def brightness_of(buffers: PlantBuffers, display: Display) -> Brightness:
     distance = usual.distance_m(PIXELS / plant.extent)
     cameras = tuple(around(plant.positions, view.direction, distance, usual) for view in seen_from)
     lights = tuple(Light(direction=view.sun) for view in views("all", SUNS))
-    found = [surface(buffers, shot_of(camera), SUPERSAMPLE) for camera in cameras]
+    found = [surface(buffers, shot_of(camera), SUPERSAMPLE, places=False) for camera in cameras]
     means = [
         [light_of(seen, light).sum() / max(len(seen.face), 1) for light in lights] for seen in found
     ]

@@ -11,17 +11,17 @@ in vec2 exposure;
 uniform int first_face;
 
 layout(location = 0) out vec4 out_color;     // albedo; face, from 1 on, 0 where nothing is
-layout(location = 1) out vec4 out_normal;    // turned to the viewer; share of light passing through
-layout(location = 2) out vec4 out_position;  // as uploaded; exposure of the viewer's side
-layout(location = 3) out vec4 out_side;      // normal of the face itself; exposure of the other side
+layout(location = 1) out vec4 out_normal;    // turned to the viewer; exposure of the viewer's side
+layout(location = 2) out vec4 out_side;      // normal of the face itself; exposure of the other side
+layout(location = 3) out vec4 out_position;  // as uploaded; share of light passing through
 
 void main() {
     vec3 color = surface_color(uv, vertex_color);
     vec3 n = turned(surface_normal(normal, position, uv), gl_FrontFacing);
     Surface s = surface(color, n, exposure, uv, gl_FrontFacing);
-    vec3 across = cross(dFdx(position), dFdy(position));
+    vec3 across = cross(dFdx(position), dFdy(position));  // towards the viewer, whatever the face
     out_color = vec4(s.color, float(first_face + gl_PrimitiveID + 1));
-    out_normal = vec4(s.normal, s.transmission);
-    out_position = vec4(position, s.exposure.x);
+    out_normal = vec4(s.normal, s.exposure.x);
     out_side = vec4(across / max(length(across), 1e-30), s.exposure.y);
+    out_position = vec4(position, s.transmission);
 }
