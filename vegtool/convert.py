@@ -23,7 +23,7 @@ from vegtool.clustering import METHODS, ClusterOptions
 from vegtool.errors import UsageError
 from vegtool.lighting.crown import crown_normals
 from vegtool.lighting.leaves import translucent
-from vegtool.lighting.light import Sun
+from vegtool.lighting.light import Light, Sun
 from vegtool.lod import Display, Level, LodChain
 from vegtool.measure.options import MeasureOptions
 from vegtool.measure.views import distance_of
@@ -128,10 +128,10 @@ class ConvertOptions:
         "Where the sun of --prelit stands: azimuth from +z towards +x, and elevation, in degrees.",
         metavar="AZ,EL",
     )
-    occlusion: float = option(
-        0.0,
+    occlusion: float | None = option(
+        None,
         "How much less of the sky's light reaches what the plant itself hides from it: 1 is all of "
-        "it, 0 none; written as occlusion textures. With --prelit it is 1.",
+        "it, 0 none; written as occlusion textures [0; with --prelit, 1].",
         least=0.0,
         most=1.0,
     )
@@ -243,7 +243,7 @@ def convert(
             rounded_up(distance_of(plant, options.display, pixels))
             for pixels in (size, NEAR_LIMITS[0])
         )
-        first = near
+        first_near_m = near
         for index, count in enumerate(counts):
 
             def report(stage: str, fraction: float, index: int = index) -> None:
@@ -263,8 +263,10 @@ def convert(
             shadow = shadow_proxy(
                 plant,
                 options.display,
-                lambda near_m: make(most, near_m, lambda stage, _: progress(stage, making)),
-                first,
+                lambda casting, seen, near_m: level_maker(casting, seen, options, casts=True)(
+                    most, near_m, lambda stage, _: progress(stage, making)
+                ),
+                first_near_m,
             )
         kept, notes = with_distances(
             plant,
@@ -278,14 +280,10 @@ def convert(
             from vegtool.refine.reach import coverage_notes
 
             notes = (*notes, *coverage_notes(kept, truth_at))
+    notes = (*notes, *light_notes(plant, sun))
     progress("levels", 1.0)
     told = {**asdict(options), **asdict(measure)}
-    baked: dict[str, float] = {}
-    if sun is not None:
-        baked = sun.as_dict()
-        if sun.elevation_deg < 0:
-            below = "the sun is below the horizon: the levels' colours have the sky's light alone"
-            notes = (*notes, below)
+    baked = {} if sun is None else sun.as_dict()
     return LodChain(
         plant.name,
         (levels[0], *kept),
@@ -298,11 +296,22 @@ def convert(
     )
 
 
+def light_notes(plant: Plant, sun: Sun | None) -> tuple[str, ...]:
+    """Sentences on light that is not what it may seem."""
+    notes = []
+    if sun is not None and sun.elevation_deg < 0:
+        notes.append("the sun is below the horizon: the levels' colours have the sky's light alone")
+    unlit = [material.name for material in plant.materials if material.unlit]
+    if 0 < len(unlit) < len(plant.materials):
+        notes.append(f"unlit beside others that are lit: levels light it too: {', '.join(unlit)}")
+    return tuple(notes)
+
+
 def as_lit(plant: Plant, options: ConvertOptions) -> Plant:
     """The plant with what the options say of light: its exposure, and what leaves let through."""
     if options.translucency is not None:
         plant = translucent(plant, options.translucency)
-    strength = options.occlusion or float(options.prelit)
+    strength = float(options.prelit) if options.occlusion is None else options.occlusion
     if strength:
         from vegtool.refine.occlusion import exposed
 
@@ -315,17 +324,20 @@ LevelMaker = Callable[[int, float, Progress], Level]
 so many metres on."""
 
 
-def level_maker(buffers: PlantBuffers, truth_at: TruthsAt, options: ConvertOptions) -> LevelMaker:
+def level_maker(
+    buffers: PlantBuffers, truth_at: TruthsAt, options: ConvertOptions, casts: bool = False
+) -> LevelMaker:
     """What makes the levels of a plant, by `options.refine`; all that they share is made here.
 
     buffers: the plant's, without mipmaps. truth_at: what it looks like, under the light that is
-    baked where one is.
+    baked where one is. casts: levels are to throw shadows and need no light.
     """
     from vegtool.gl.pictures import BakedLight
 
-    under = truth_at.under
-    lit = None
-    if under is not None and under.shadows is not None:
+    under, lit = truth_at.under, None
+    if all(material.unlit for material in buffers.plant.materials):
+        lit = BakedLight(Light())
+    elif under is not None and under.shadows is not None and not casts:
         lit = BakedLight(under.light, under.shadows)
     if options.refine == "none":
         return partial(billboard_level, buffers, options, lit)
@@ -335,7 +347,8 @@ def level_maker(buffers: PlantBuffers, truth_at: TruthsAt, options: ConvertOptio
 
     def make(count: int, near_m: float, progress: Progress) -> Level:
         most = TRIANGLES_PER_BILLBOARD * count
-        wanted = Wanted(most, near_m, options.max_texture, options.seed)
+        balance = not casts and not options.crown_normals  # which it would bend back
+        wanted = Wanted(most, near_m, options.max_texture, options.seed, balance)
         return refined_level(source, wanted, progress)
 
     return make

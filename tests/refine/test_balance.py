@@ -275,12 +275,6 @@ def test_the_plant_itself_needs_hardly_any_change(tree: Tree) -> None:
 
 
 @pytest.mark.gl
-def test_a_level_with_its_light_in_its_colours_stays(tree: Tree) -> None:
-    unlit = replace(tree.level, unlit=True)
-    assert balanced(unlit, tree.plant, tree.wanted) is unlit
-
-
-@pytest.mark.gl
 def test_a_level_of_which_nothing_is_seen_stays(tree: Tree) -> None:
     atlas = tree.level.atlas
     assert atlas is not None

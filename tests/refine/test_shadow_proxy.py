@@ -20,7 +20,7 @@ from vegtool.lod import Atlas, Billboards, Display, Level, ShadowProxy
 from vegtool.measure.distances import rounded_up
 from vegtool.measure.options import MeasureOptions
 from vegtool.measure.scores import TruthsAt
-from vegtool.measure.views import distance_of, views
+from vegtool.measure.views import distance_of
 from vegtool.plant import Plant
 from vegtool.progress import silent
 from vegtool.refine.shadow_proxy import PIXELS, SUNS, as_caster, shadow_proxy
@@ -43,21 +43,20 @@ def worst_bias(shadow: ShadowProxy) -> float:
 
 @pytest.fixture(scope="module")
 def broadleaf() -> dict[int, ShadowProxy]:
-    """Of a tree, by triangles; all from one maker, as what it knows of the tree takes longest."""
+    """Of a tree, by triangles."""
     plant, options = sample("broadleaf", 2000), ConvertOptions()
     near_m = rounded_up(distance_of(plant, options.display, 2 * PIXELS))
-    with PlantBuffers(plant) as buffers:
-        truth_at = TruthsAt(plant, views("all", 6), options.display, buffers)
-        make = level_maker(buffers, truth_at, options)
-        return {
-            count: shadow_proxy(
-                plant,
-                options.display,
-                lambda metres, count=count: make(count // 2, metres, silent),
-                near_m,
-            )
-            for count in (48, 400)
-        }
+    return {
+        count: shadow_proxy(
+            plant,
+            options.display,
+            lambda buffers, seen, metres, count=count: level_maker(
+                buffers, seen, options, casts=True
+            )(count // 2, metres, silent),
+            near_m,
+        )
+        for count in (48, 400)
+    }
 
 
 def test_there_is_none_unless_asked_for() -> None:
@@ -210,7 +209,7 @@ def test_it_is_made_for_where_it_is_measured_or_nearer() -> None:
     level = hybrid_of(plant, 4, 20.0)
     far = rounded_up(distance_of(plant, Display(), PIXELS))
 
-    def make(near_m: float) -> Level:
+    def make(buffers: PlantBuffers, seen: TruthsAt, near_m: float) -> Level:
         asked.append(near_m)
         return level
 

@@ -52,12 +52,12 @@ class Pictures:
 class BakedLight:
     """Light that is put into the colours of pictures, in place of their normals.
 
-    shadows: what the sun sees. both_sides: one picture serves both sides of a billboard and shows
-    the mean of their light.
+    shadows: what the sun sees; None for plants that are unlit, whose colours stay. both_sides: one
+    picture serves both sides of a billboard and shows the mean of their light.
     """
 
     light: Light
-    shadows: SunMaps
+    shadows: SunMaps | None = None
     both_sides: bool = True
 
 
@@ -203,7 +203,7 @@ def _draw(
                 continue
             defines = _defines(buffers, group, baked, light)
             shader = program(ctx, "picture.vert", "picture.frag", *defines)
-            if baked is not None:
+            if baked is not None and not group.material.unlit:
                 set_light(shader, buffers, baked.light, baked.shadows)
                 shader["both_sides"] = baked.both_sides
             shader["side"] = side
@@ -235,15 +235,17 @@ def _defines(
         "NORMAL_MAP": group.normal_map is not None,
         "LIGHT_MAP": group.light_map is not None,
         "LIT": baked is not None,
+        "UNLIT": group.material.unlit,
         "LIGHT": light,
     }
-    shadows = () if baked is None else baked.shadows.defines
+    shadows = () if baked is None or baked.shadows is None else baked.shadows.defines
     return [*(name for name, wanted in defines.items() if wanted), *shadows]
 
 
 def _channels(normals: bool, light: bool) -> tuple[str, ...]:
     """What is drawn beside colour and depth, in the order of the shaders' outputs."""
-    return ("normal",) * normals + ("light",) * light
+    wanted = {"normal": normals, "light": light}
+    return tuple(name for name, drawn in wanted.items() if drawn)
 
 
 def _picture_table(buffers: PlantBuffers, pictures: Pictures) -> moderngl.Texture:

@@ -44,6 +44,7 @@ MOST_TURN = 0.5
 """Radians."""
 FINE = 1024
 """Elements; of more, every second, third, ... sun is enough, and the matrix stays small."""
+LEAST_SUNS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,12 +74,10 @@ def balanced(level: Level, plant: Plant, wanted: Brightness) -> Level:
     """The level with normals bent, where that helps, and with the colours and normals of pictures
     and triangles changed, each by itself.
 
-    Seen from where it may be used on. plant: what it is made of. A level whose light is in its
-    colours stays as it is: it looks the same from both sides of the light, and gains that follow
-    what does not would only make it patchy. Raises CapabilityError where OpenGL cannot draw.
+    Seen from where it may be used on. plant: what it is made of. Not for a level whose light is in
+    its colours: it looks the same from both sides of the light, and gains that follow what does not
+    would only make it patchy. Raises CapabilityError where OpenGL cannot draw.
     """
-    if level.unlit:
-        return level
     samples = _samples(level, plant, wanted)
     known = (samples.count > 0) & (wanted.values > 0).all(axis=1)
     if not known.any():
@@ -106,7 +105,7 @@ def best_bend(level: Level, samples: Samples, wanted: Brightness, known: np.ndar
         return Bend()
     best, least = Bend(), error(Bend())
     mapped = level.atlas is not None and level.atlas.normal is not None
-    for name, values in (("lean", LEANS[1:] * mapped), ("height", HEIGHTS[1:])):
+    for name, values in (("lean", LEANS[1:] if mapped else ()), ("height", HEIGHTS[1:])):
         for value in values:
             tried = replace(best, **{name: value})
             if (found := error(tried)) >= least:
@@ -206,29 +205,31 @@ def _matrices(
     normals about x, y and z, (m, 3 e), as shares of what the plant's is; a row for each view that
     is known under each light."""
     shown, turning = [], []
-    step = 1 + samples.elements // FINE
+    x, _, z = samples.normal.T
+    upward = np.stack([-z, np.zeros_like(x), x], axis=1)  # normal x up
+    here = samples.albedo * (1 - samples.transmission) * samples.exposure[:, 0]
+    behind = samples.tinted * samples.transmission * samples.exposure[:, 1]
+    cell = samples.view * samples.elements + samples.element
+    step = min(1 + samples.elements // FINE, max(len(wanted.lights) // LEAST_SUNS, 1))
     for number, light in list(enumerate(wanted.lights))[::step]:
         lit = _light(samples, light)
         toward = samples.normal @ light.unit
         front = light.sun * (1 - samples.transmission) * (toward > 0)
         back = -light.sun * samples.transmission * samples.exposure[:, 1] * (toward < 0)
         pull = samples.albedo * front + samples.tinted * back
-        here = samples.albedo * (1 - samples.transmission) * samples.exposure[:, 0]
-        behind = samples.tinted * samples.transmission * samples.exposure[:, 1]
         slope = (light.sky_above - light.sky_below) / 2 * (here - behind)
         moment = pull[:, None] * np.cross(samples.normal, light.unit)
-        moment += slope[:, None] * np.cross(samples.normal, np.array([0.0, 1.0, 0.0]))
-        true = wanted.values[:, number]
-        shown.append(_rows(samples, lit, true)[known])
-        turning.append(
-            np.concatenate([_rows(samples, axis, true)[known] for axis in moment.T], axis=1)
-        )
+        moment += slope[:, None] * upward
+        total = samples.count * wanted.values[:, number]
+        rows = [_rows(samples, cell, each, total)[known] for each in (lit, *moment.T)]
+        shown.append(rows[0])
+        turning.append(np.concatenate(rows[1:], axis=1))
     return np.concatenate(shown), np.concatenate(turning)
 
 
-def _rows(samples: Samples, values: FloatArray, true: FloatArray) -> FloatArray:
-    """(v, e) sums of values (n,) by view and element, over the samples of a view and (v,)."""
+def _rows(samples: Samples, cell: IntArray, values: FloatArray, total: FloatArray) -> FloatArray:
+    """(v, e) sums of values (n,) by view and element, which `cell` (n,) numbers, over a total of
+    each view, (v,)."""
     views, elements = len(samples.count), samples.elements
-    cell = samples.view * elements + samples.element
     sums = np.bincount(cell, values, views * elements).reshape(views, elements)
-    return np.asarray(sums / np.maximum(samples.count * true, np.finfo(float).tiny)[:, None])
+    return np.asarray(sums / np.maximum(total, np.finfo(float).tiny)[:, None])

@@ -72,7 +72,7 @@ def _bent_pictures(
     for rects, side in sides:
         for number, rect in enumerate(rects.tolist()):
             x, y, w, h = rect
-            around = np.s_[max(y - GUTTER, 0) : y + h + GUTTER, max(x - GUTTER, 0) : x + w + GUTTER]
+            around = np.s_[y - GUTTER : y + h + GUTTER, x - GUTTER : x + w + GUTTER]
             u, v, n = billboards.u[number], billboards.v[number], billboards.normal[number]
             frame = np.stack([u, v, side * n])
             part = values[around].reshape(-1, 3) @ frame
@@ -83,6 +83,6 @@ def _bent_pictures(
     bytes_of = normal_bytes(result)
     if atlas.white is not None:
         x, y, w, h = atlas.white.tolist()
-        block = np.s_[max(y - GUTTER, 0) : y + h + GUTTER, max(x - GUTTER, 0) : x + w + GUTTER]
+        block = np.s_[y - GUTTER : y + h + GUTTER, x - GUTTER : x + w + GUTTER]
         bytes_of[block] = normal[block]
     return np.asarray(bytes_of)

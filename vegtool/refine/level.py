@@ -76,7 +76,7 @@ class Source:
     @cached_property
     def colored(self) -> Plant:
         """The plant with the colours that triangles take."""
-        if self.lit is None:
+        if self.lit is None or self.lit.shadows is None:
             return self.plant
         return lit_plant(self.plant, self.lit.light, self.lit.shadows.read())
 
@@ -109,12 +109,14 @@ class Source:
 @dataclass(frozen=True)
 class Wanted:
     """A level to be: at most so many triangles, for distances from `near_m` metres on, and textures
-    of at most `max_texture` texels a side."""
+    of at most `max_texture` texels a side. balance: whether its light is to be the plant's from all
+    around."""
 
     triangles: int
     near_m: float
     max_texture: int = BakeOptions().max_texture
     seed: int = 0
+    balance: bool = True
 
     @property
     def far_m(self) -> float:
@@ -161,7 +163,7 @@ def refined_level(source: Source, wanted: Wanted, progress: Progress = silent) -
         with timed(seconds, "foliage"):
             made = better(source, wanted, made, as_triangles(source, wanted, wood, left))
     level = replace(made.level, near_distance_m=wanted.near_m)
-    if source.lit is None:
+    if wanted.balance and not level.unlit:
         progress("balance", 0.9)
         with timed(seconds, "balance"):
             level = balanced(level, source.plant, source.brightness)

@@ -36,7 +36,7 @@ def lit_plant(plant: Plant, light: Light, depths: SunDepths) -> Plant:
 
 
 def face_light(plant: Plant, light: Light, depths: SunDepths) -> FloatArray:
-    """(f, 3) mean light on each face, as a factor of its albedo."""
+    """(f, 3) mean light on each face, as a factor of its albedo; 1 where it is unlit."""
     count = int(np.clip(MOST_PLACES // len(plant.faces), 1, len(WITHIN)))
     side = unit(plant.face_area_vectors / (plant.radius or 1.0) ** 2)
     both = np.array([m.double_sided for m in plant.materials])[plant.face_material]
@@ -55,4 +55,5 @@ def face_light(plant: Plant, light: Light, depths: SunDepths) -> FloatArray:
         other = None if exposure is None else exposure[:, ::-1]
         back = shaded(white, -normal, light, other, share, tint, seen, seen)
         total += np.where(both[:, None], (front + back) / 2, front)
-    return total / count
+    unlit = np.array([m.unlit for m in plant.materials])[plant.face_material]
+    return np.where(unlit[:, None], 1.0, total / count)

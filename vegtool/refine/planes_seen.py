@@ -34,7 +34,7 @@ def seen(pieces: Pieces, surface: float, size: float, opacity: float) -> FloatAr
     total = np.zeros(len(pieces))
     shown = np.zeros(len(pieces))
     for direction, toward, away in transmittances(pieces, surface, size, opacity):
-        turned = turned_to(pieces, direction)
+        turned = rms_cosine(pieces, direction)
         total += turned * (toward + away) / 2
         shown += turned
     return np.divide(total, shown, out=np.ones_like(total), where=shown > 0)
@@ -49,7 +49,7 @@ def transmittances(
         if size == 0:
             yield direction, np.ones(len(pieces)), np.ones(len(pieces))
             continue
-        depth = opacity * surface * pieces.weight * turned_to(pieces, direction)
+        depth = opacity * surface * pieces.weight * rms_cosine(pieces, direction)
         depth = depth / (COLUMN * size) ** 2
         across = np.cross(direction, np.eye(3)[np.abs(direction).argmin()])
         sides = unit(np.stack([across, np.cross(direction, across)]))
@@ -67,7 +67,7 @@ def transmittances(
         yield direction, np.exp(-np.maximum(before, 0)), np.exp(-np.maximum(behind, 0))
 
 
-def turned_to(pieces: Pieces, direction: FloatArray) -> FloatArray:
+def rms_cosine(pieces: Pieces, direction: FloatArray) -> FloatArray:
     """(n,) root mean square of the cosines of the pieces' normals to a direction, (3,) unit."""
     return np.asarray(np.sqrt(np.maximum(pieces.looks @ tensor(direction[None])[0], 0.0)))
 

@@ -59,8 +59,8 @@ def _pictures(atlas: Atlas, billboards: Billboards, gain: FloatArray, turn: Floa
         sides.insert(0, (atlas.back, -1.0))  # of a picture for both sides, the front's counts
     rects = np.concatenate([rect for rect, _ in sides])
     grown = rects + np.array([-GUTTER, -GUTTER, 2 * GUTTER, 2 * GUTTER], np.int32)
-    owner = owners(color.shape[:2], np.maximum(grown, 0))
-    for number, (x, y, w, h) in enumerate(np.maximum(grown, 0).tolist()):
+    owner = owners(color.shape[:2], grown)
+    for number, (x, y, w, h) in enumerate(grown.tolist()):
         which, side = number % len(gain), sides[number // len(gain)][1]
         part = np.s_[y : y + h, x : x + w]
         own = owner[part] == number

@@ -22,7 +22,7 @@ from vegtool.baking.options import BakeOptions
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Atlas, Display, Level, ShadowProxy, Spread
 from vegtool.measure.distances import rounded_up
-from vegtool.measure.scores import Scores, scores, truths
+from vegtool.measure.scores import Scores, TruthsAt, scores, truths
 from vegtool.measure.views import View, distance_of, views
 from vegtool.plant import Material, Plant
 
@@ -31,24 +31,29 @@ PIXELS = 100.0
 texel of the shadow map is 10 cm."""
 PARALLEL = Display(fov_y_deg=5.0)
 """So narrow an angle that rays are as good as parallel, which a sun's are."""
+VIEWS = 6
+"""By which its coverage is made the plant's."""
 SUNS = 12
 """From 15 to 75 degrees above the horizon, all around (measure/views.py)."""
 METRICS = ("coverage_bias", "silhouette")
 """What is measured of a silhouette."""
 
 
-def shadow_proxy(
-    plant: Plant, display: Display, make: Callable[[float], Level], near_m: float
-) -> ShadowProxy:
+Make = Callable[[PlantBuffers, TruthsAt, float], Level]
+"""Makes a level of a plant, beside its truths, for distances from so many metres on."""
+
+
+def shadow_proxy(plant: Plant, display: Display, make: Make, near_m: float) -> ShadowProxy:
     """What throws the plant's shadow, and how wrong its silhouettes are.
 
-    make: makes a level for distances from so many metres on, with as many triangles as there may
-    be. near_m: the distance that it is made for, or that of PIXELS, the nearer one.
-    Raises CapabilityError where OpenGL cannot draw.
+    make: with as many triangles as there may be. near_m: the distance that it is made for, or that
+    of PIXELS, the nearer one. Raises CapabilityError where OpenGL cannot draw.
     """
     near_m = min(near_m, rounded_up(distance_of(plant, display, PIXELS)))
-    level = as_caster(make(near_m))
     casting = _from_both_sides(plant)
+    with PlantBuffers(casting) as buffers:
+        truth_at = TruthsAt(casting, views("all", VIEWS), display, buffers)
+        level = as_caster(make(buffers, truth_at, near_m))
     suns = tuple(View(view.sun, view.sun) for view in views("all", SUNS))
     true = truths(casting, suns, [PIXELS], PARALLEL)
     with PlantBuffers(casting, mipmaps=True) as drawn:

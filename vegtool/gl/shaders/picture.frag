@@ -1,5 +1,5 @@
 // One sample of a picture: colour with gamma 2 (10 bits are then finer than 8 bits of sRGB); normal,
-// or with LIT the light that falls on it in the colour instead; with LIGHT what is baked of light.
+// or with LIT the light that falls on it in the colour instead, but for UNLIT ones; with LIGHT what is baked of light.
 // Alpha marks that a surface is there. Depth is the depth buffer's.
 #include "material.glsl"
 #if defined(LIT) || defined(LIGHT)
@@ -46,9 +46,10 @@ void main() {
     vec3 placed = v_frame * vec3(normal.xy, normal.z * side);
     Surface s = surface(color, placed, v_exposure, v_uv, gl_FrontFacing);
 #endif
-#ifdef LIT
+#if defined(LIT) && !defined(UNLIT)
     color = min(lit_picture(s), 1.0);
-#else
+#endif
+#ifndef LIT
     out_normal = vec4((normal * 511.0 + 512.0) / 1023.0, 1.0);
 #endif
 #ifdef LIGHT
