@@ -199,3 +199,44 @@ def test_crown_normals_are_those_of_the_levels_alone(bush: Plant) -> None:
     assert a is not None and b is not None and a.normal is not None and b.normal is not None
     if a.normal.shape == b.normal.shape:
         assert (a.normal != b.normal).mean() > 0.1
+
+
+@pytest.mark.gl
+@pytest.mark.parametrize("refine", ["full", "none"])
+def test_an_unlit_plant_has_unlit_levels_in_its_own_colours(refine: str) -> None:
+    """Colours are what is seen: the mean of what a level covers is the plant's, without any light."""
+    plant = sample("bush", 600)
+    unlit = replace(plant, materials=tuple(replace(m, unlit=True) for m in plant.materials))
+    options = ConvertOptions(refine=refine, billboards=40, levels=1)
+    level = convert(unlit, options, MeasureOptions(measure="off")).levels[1]
+    assert level.unlit
+    assert level.atlas is not None and level.atlas.normal is None
+    covered = level.atlas.color[level.atlas.color[..., 3] > 127][:, :3].astype(float)
+    lit = convert(plant, options, MeasureOptions(measure="off")).levels[1]
+    assert lit.atlas is not None
+    same = lit.atlas.color[lit.atlas.color[..., 3] > 127][:, :3].astype(float)
+    assert np.abs(covered.mean(axis=0) - same.mean(axis=0)).max() < 12
+
+
+@pytest.mark.gl
+def test_unlit_beside_lit_is_told() -> None:
+    plant = sample("bush", 600)
+    first = replace(plant.materials[0], unlit=True)
+    mixed = replace(plant, materials=(first, *plant.materials[1:]))
+    options = ConvertOptions(refine="none", billboards=20, levels=1)
+    notes = convert(mixed, options, MeasureOptions(measure="off")).notes
+    assert any(first.name in note and "unlit" in note for note in notes)
+
+
+@pytest.mark.gl
+def test_no_occlusion_with_prelit_is_none() -> None:
+    """0 that is asked for is 0: the sky's light reaches all of the plant."""
+    plant = sample("bush", 600)
+    options = {"refine": "none", "billboards": 20, "levels": 1, "prelit": True, "sun": "60,40"}
+    off = MeasureOptions(measure="off")
+    open_, usual = (
+        convert(plant, ConvertOptions(**options, **more), off).levels[1].atlas
+        for more in ({"occlusion": 0.0}, {})
+    )
+    assert open_ is not None and usual is not None
+    assert open_.color[..., :3].mean() > usual.color[..., :3].mean()

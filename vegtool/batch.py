@@ -288,6 +288,8 @@ def _outcome(job: Job, task: Task, progress: Progress = silent) -> Outcome:
 
 
 def _row(chain: LodChain, index: int) -> dict[str, Any]:
+    from vegtool.formats.ramp import written_texels
+
     level = chain.levels[index]
     measured = level.measured
     return {
@@ -295,7 +297,7 @@ def _row(chain: LodChain, index: int) -> dict[str, Any]:
         "kind": level.kind,
         "billboards": 0 if level.billboards is None else len(level.billboards),
         "triangles": level.triangles,
-        "texels": level.texels,
+        "texels": written_texels(level),
         "switch_distance_m": float(f"{level.near_distance_m:.4g}"),
         "flip": None if measured is None else round(measured.errors["flip"].mean, 4),
         "live_flip": None if measured is None else round(measured.live["flip"].mean, 4),

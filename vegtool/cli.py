@@ -127,12 +127,14 @@ def convert_command(
     from vegtool.outcomes import as_summary, summary_text
 
     console = Console(-1 if quiet else verbose, json)
+    of_scene: list[str] = []
     if scene is not None:
         from vegtool.scene import read_scene, unused, with_scene
 
         described = read_scene(scene)
         convert = with_scene(convert, described)
-        for note in unused(described):
+        of_scene = unused(described, convert)
+        for note in of_scene:
             console.say(note)
     todo = find_jobs(inputs)
     sources = tuple(job.source for job in todo)
@@ -155,7 +157,7 @@ def convert_command(
             spent = ", ".join(f"{stage} {s:.2f} s" for stage, s in row["seconds"].items())
             if spent:
                 console.say(f"{outcome.job.name}: level {row['level']}: {spent}", at=1)
-    console.result(as_summary(outcomes), summary_text(outcomes, dry_run))
+    console.result(as_summary(outcomes, of_scene), summary_text(outcomes, dry_run))
     failed = [o for o in outcomes if o.error]
     missed = [f"{o.job.name}: {sentence}" for o in outcomes for sentence in o.misses]
     if missed and failed:

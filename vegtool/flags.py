@@ -59,7 +59,7 @@ def _flag(item: Any, hint: Any, group: str) -> inspect.Parameter:
         hint = Literal[about["choices"]]
     setting = typer.Option(
         *names,
-        help=about.get("help", ""),
+        help=_literal(about.get("help", "")),
         metavar=about.get("metavar"),
         rich_help_panel=_panel(group),
     )
@@ -69,6 +69,14 @@ def _flag(item: Any, hint: Any, group: str) -> inspect.Parameter:
         default=default,
         annotation=Annotated[hint, setting],
     )
+
+
+def _literal(text: str) -> str:
+    """Text that means what it says where rich's markup is read, to which [words] are styles.
+
+    As `rich.markup.escape`, which takes longer to load than all flags to make.
+    """
+    return re.sub(r"(\[[a-z#/@][^\[]*?\])", r"\\\1", text)
 
 
 def _panel(group: str) -> str:

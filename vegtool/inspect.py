@@ -55,7 +55,10 @@ def inspection_text(inspection: dict[str, Any]) -> str:
     low, high = (np.array(c) for c in inspection["bounds_m"])
     size = " x ".join(f"{s:.3g}" for s in high - low)
     materials = [
-        (m["name"], m["role"], f"{m['triangles']:,}", m["alpha"], m["texture"], m["sides"])
+        (
+            m["name"], m["role"], f"{m['triangles']:,}", m["alpha"], m["texture"], m["sides"],
+            _light(m),
+        )  # fmt: skip
         for m in inspection["materials"]
     ]
     branches = inspection["branches"]
@@ -67,7 +70,7 @@ def inspection_text(inspection: dict[str, Any]) -> str:
         f"  {size} metres, from ({low[0]:.3g}, {low[1]:.3g}, {low[2]:.3g})",
         f"  branches ({branches['source']}): {levels}",
         "",
-        table(("material", "role", "triangles", "alpha", "texture", "sides"), materials),
+        table(("material", "role", "triangles", "alpha", "texture", "sides", "light"), materials),
     ]
     if inspection["notes"]:
         lines += ["", *(f"note: {note}" for note in inspection["notes"])]
@@ -87,7 +90,16 @@ def _material(plant: Plant, index: int, material: Material) -> dict[str, Any]:
         "normal_texture": material.normal_texture is not None,
         "base_color": [round(float(c), 4) for c in material.base_color],
         "sides": "both" if material.double_sided else "front",
+        "unlit": material.unlit,
+        "transmission": round(material.transmission, 4),
     }
+
+
+def _light(material: dict[str, Any]) -> str:
+    """What a person is told of a material and light: that it takes none, or how much passes."""
+    if material["unlit"]:
+        return "unlit"
+    return f"passes {material['transmission']:.2f}" if material["transmission"] else ""
 
 
 def _branches(branches: Branches) -> dict[str, Any]:

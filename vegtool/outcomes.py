@@ -9,15 +9,15 @@ from vegtool.batch import Outcome
 from vegtool.console import human_bytes, table
 
 
-def as_summary(outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
-    """What `--json` prints."""
+def as_summary(outcomes: Sequence[Outcome], notes: Sequence[str] = ()) -> list[dict[str, Any]]:
+    """What `--json` prints. notes: sentences that hold for each of them, beside their own."""
     return [
         {
             "source": str(outcome.job.source),
             "files": outcome.files,
             "levels": list(outcome.levels),
             "shadow": outcome.shadow,
-            "notes": list(outcome.notes),
+            "notes": [*notes, *outcome.notes],
             "misses": list(outcome.misses),
             "seconds": round(outcome.seconds, 3),
             "error": outcome.error,

@@ -6,9 +6,11 @@ what a command does not use yet stays as it was read.
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
+from math import hypot
 from pathlib import Path
 from typing import Any
 
@@ -23,12 +25,14 @@ Place = tuple[str | int, ...]
 
 @dataclass(frozen=True)
 class Key:
-    """What a key may hold: one of KINDS, within inclusive limits; one of some words, if any."""
+    """What a key may hold: one of KINDS, within inclusive limits, and greater than `above`; one of
+    some words, if any."""
 
     kind: str
     help: str
     least: float | None = None
     most: float | None = None
+    above: float | None = None
     choices: tuple[str, ...] = ()
 
 
@@ -55,7 +59,7 @@ SCHEMA: dict[str, dict[str, Key]] = {
     "terrain": {
         "kind": Key("text", "what plants stand on", choices=("none", "plane", "heightmap")),
         "heightmap": Key("text", "file with heights"),
-        "extent_m": Key("pair", "size along x and z"),
+        "extent_m": Key("pair", "size along x and z", above=0),
         "crs": Key("text", "coordinate reference system, such as EPSG:25832"),
         "height_m": Key("range", "lowest and highest ground"),
     },
@@ -77,7 +81,7 @@ SCHEMA: dict[str, dict[str, Key]] = {
     "budget": {
         "bytes": Key("integer", "of all files", least=1),
         "triangles": Key("integer", "drawn at a time", least=1),
-        "frame_ms": Key("number", "time to draw a frame", least=0),
+        "frame_ms": Key("number", "time to draw a frame", above=0),
     },
 }  # fmt: skip
 """Tables and their keys."""
@@ -85,6 +89,8 @@ LISTED = ("species",)
 """Tables that may stand in a file again and again, as [[species]]."""
 NEEDED = {"light": "moves"}
 """A key that a table does not go without."""
+NEEDED_BY = {("terrain", "kind", "heightmap"): "heightmap"}
+"""A key that a table does not go without where another one has that value."""
 USED = {
     ("camera", "fov_y_deg"),
     ("camera", "image_height_px"),
@@ -107,6 +113,17 @@ def _is_pair(value: Any) -> bool:
     return isinstance(value, list) and len(value) == 2 and all(map(_is_number, value))
 
 
+def _has_area(points: list[list[float]]) -> bool:
+    """Whether points do not all lie on one line: to a billionth of their extent."""
+    if not points:
+        return False
+    (x, z), *_ = points
+    moved = [(float(a) - x, float(b) - z) for a, b in points]
+    farthest = max(moved, key=lambda p: hypot(*p))
+    across = max(abs(farthest[0] * b - farthest[1] * a) for a, b in moved)
+    return across > 1e-9 * (farthest[0] ** 2 + farthest[1] ** 2)
+
+
 KINDS: dict[str, tuple[str, Callable[[Any], bool]]] = {
     "boolean": ("true or false", lambda v: isinstance(v, bool)),
     "integer": ("a whole number", lambda v: _is_number(v) and isinstance(v, int)),
@@ -115,8 +132,8 @@ KINDS: dict[str, tuple[str, Callable[[Any], bool]]] = {
     "pair": ("two numbers, [a, b]", _is_pair),
     "range": ("two numbers, [low, high]", lambda v: _is_pair(v) and v[0] <= v[1]),
     "points": (
-        "three points at least, [[x, z], [x, z], [x, z]]",
-        lambda v: isinstance(v, list) and len(v) >= 3 and all(map(_is_pair, v)),
+        "three points at least that are not on one line, [[x, z], [x, z], [x, z]]",
+        lambda v: isinstance(v, list) and all(map(_is_pair, v)) and _has_area(v),
     ),
     "words": (
         'names in quotes, { x = "easting" }',
@@ -207,16 +224,23 @@ def with_scene(options: ConvertOptions, scene: Scene) -> ConvertOptions:
     return replace(options, **display, sun=_agreed_sun(options, scene))
 
 
-def unused(scene: Scene) -> list[str]:
-    """A sentence on what `convert` reads and does not use, where there is something."""
+def unused(scene: Scene, options: ConvertOptions) -> list[str]:
+    """Sentences on what `convert` reads and, with these options, does not use."""
+    notes = []
+    if scene.light is not None and scene.light.sun is not None and not options.prelit:
+        notes.append(
+            f"{scene.at('light', 'sun')}: sun changes nothing without --prelit: levels are lit by "
+            "whoever shows them"
+        )
     used_tables = {table for table, _ in USED}
     keys = [place for place in scene.lines if len(place) == 2 and place[0] in used_tables]
     tables = dict.fromkeys(str(place[0]) for place in scene.lines)
     found = [_header(table) for table in tables if table not in used_tables]
     found += [f"[{table}] {key}" for table, key in keys if (table, key) not in USED]
-    if not found:
-        return []
-    return [f"{scene.path}: checked, but of no effect on convert yet: {', '.join(found)}"]
+    if found:
+        listed = ", ".join(found)
+        notes.append(f"{scene.path}: checked, but of no effect on convert yet: {listed}")
+    return notes
 
 
 def _agreed(options: ConvertOptions, scene: Scene, name: str, key: str) -> Any:
@@ -279,13 +303,17 @@ def _check_table(path: Path, lines: Mapping[Place, int], name: str, table: Any) 
             raise UsageError(f"{_at(path, lines, place)}: expected a table {_header(name)}")
         for key, value in part.items():
             _check(_at(path, lines, (*place, key)), name, key, value)
-        needed = NEEDED.get(name)
-        if needed is not None and needed not in part:
-            expected = KINDS[SCHEMA[name][needed].kind][0]
-            raise UsageError(
-                f"{_at(path, lines, place)}: expected {needed} in {_header(name)}, {expected}; "
-                "got none"
-            )
+        if name in NEEDED and NEEDED[name] not in part:
+            raise UsageError(f"{_at(path, lines, place)}: {_lacks(name, NEEDED[name])}")
+        for (table, key, value), needed in NEEDED_BY.items():
+            if table == name and part.get(key) == value and needed not in part:
+                at = _at(path, lines, (*place, key))
+                raise UsageError(f'{at}: {key} is "{value}": {_lacks(name, needed)}')
+
+
+def _lacks(table: str, key: str) -> str:
+    expected = KINDS[SCHEMA[table][key].kind][0]
+    return f"expected {key} in {_header(table)}, {expected}; got none"
 
 
 def _parts(name: str, table: Any) -> Iterator[tuple[Place, Any]]:
@@ -317,6 +345,8 @@ def _check(at: str, table: str, key: str, value: Any) -> None:
             raise UsageError(f"{at}: {key}: expected at least {rule.least:g}; got {number:g}")
         if rule.most is not None and number > rule.most:
             raise UsageError(f"{at}: {key}: expected at most {rule.most:g}; got {number:g}")
+        if rule.above is not None and not number > rule.above:
+            raise UsageError(f"{at}: {key}: expected more than {rule.above:g}; got {number:g}")
 
 
 def _toml(value: Any) -> str:
@@ -335,24 +365,36 @@ def _at(path: Path, lines: Mapping[Place, int], place: Place) -> str:
     return f"{path}, line {lines[place]}" if place else f"{path}"
 
 
+_TOKEN = re.compile(
+    r'''"""(?:\\.|[^\\])*?"{3,5}|'{3}.*?'{3,5}|"(?:\\.|[^"\\\n])*"|'[^'\n]*'|#[^\n]*|[][{}\n]''',
+    re.DOTALL,
+)
+"""What says where statements of TOML end: strings and comments whole, brackets, ends of lines."""
+
+
+def _statements(text: str) -> Iterator[tuple[int, str]]:
+    """The statements of a TOML file that is known to be right, headers and keys with their values,
+    each with the number of its first line: they end where a line does, outside of all brackets."""
+    start, depth, number, first = 0, 0, 1, 1
+    for token in _TOKEN.finditer(text):
+        mark = token[0]
+        number += mark.count("\n")
+        depth += (mark in "[{") - (mark in "]}")
+        if mark == "\n" and depth == 0:
+            yield first, text[start : token.end()]
+            start, first = token.end(), number
+
+
 def _lines(text: str) -> dict[Place, int]:
     """The line of every key of a TOML file that is known to be right.
 
-    Each of its statements, a header or a key with its value, is a file of its own too: it ends
-    with the first line that makes it one.
+    Each of its statements is a file of its own too.
     """
     found: dict[Place, int] = {}
     counts: dict[Place, int] = {}
     header: Place = ()
-    statement, first = "", 1
-    for number, line in enumerate(text.replace("\r\n", "\n").split("\n"), start=1):
-        statement += line + "\n"
-        if line.rstrip().endswith(",") and "#" not in line:
-            continue  # in a list: not tried, so that long ones are quick
-        try:
-            values = tomllib.loads(statement)
-        except tomllib.TOMLDecodeError:
-            continue
+    for first, statement in _statements(text.replace("\r\n", "\n") + "\n"):
+        values = tomllib.loads(statement)
         if statement.lstrip().startswith("["):
             header = _header_place(values, counts)
             for length in range(1, len(header) + 1):
@@ -360,7 +402,6 @@ def _lines(text: str) -> dict[Place, int]:
         else:
             for place in _places(values):
                 found.setdefault((*header, *place), first)
-        statement, first = "", number + 1
     return found
 
 

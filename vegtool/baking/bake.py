@@ -35,6 +35,8 @@ WHITE = 4
 """Texels: side of a white block. In the middle of four, mips 0 and 1 are white wherever it lies."""
 FLAT = (128, 128, 255)
 """A normal that points straight out."""
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+"""Of linear red, green and blue."""
 ALL_OF_THE_SKY = np.ones(2)
 """The exposure of what nothing hides."""
 
@@ -234,12 +236,12 @@ def has_light(plant: Plant) -> bool:
 
 
 def transmission_tint(plant: Plant) -> FloatArray:
-    """(3,) of all light that passes through a plant's leaves, by how much passes and how large they
-    are; white where none does."""
+    """(3,) of all light that passes through a plant's leaves, by how much passes, how large and how
+    bright they are; white where none does. 0 to 1, as a file holds it."""
     area = np.bincount(plant.face_material, plant.face_areas, len(plant.materials))
-    weight = area * np.array([m.transmission for m in plant.materials])
+    bright = np.array([m.base_color[:3] @ LUMINANCE for m in plant.materials])
+    weight = area * bright * np.array([m.transmission for m in plant.materials])
     if not weight.sum() > 0:
         return np.ones(3)
-    return np.asarray(
-        weight @ np.array([m.transmission_tint for m in plant.materials]) / weight.sum()
-    )
+    tints = np.array([m.transmission_tint for m in plant.materials])
+    return np.asarray(np.clip(weight @ tints / weight.sum(), 0.0, 1.0))

@@ -21,7 +21,9 @@ from vegtool.arrays import FloatArray, IntArray, unit
 from vegtool.formats import png
 from vegtool.formats.atomic import FileSet
 from vegtool.formats.glb import ELEMENT_ARRAY_BUFFER, Document
+from vegtool.formats.gltf_material import TRANSMISSION, UNLIT
 from vegtool.formats.manifest import LevelFile, encode, manifest, screen_height_fraction
+from vegtool.formats.ramp import RAMP, on_ramp
 from vegtool.formats.tangents import tangents
 from vegtool.lod import Level, LodChain, level_triangles
 from vegtool.plant import Branches, Material, Plant, Texture
@@ -30,8 +32,6 @@ ALPHA_CUTOFF = 0.5  # of a billboard: what baking/coverage.py fits its alpha to
 ROUGHNESS = 0.9  # of a billboard: foliage seen from afar has no highlight of its own
 FAR_FROM_ORIGIN = 16.0  # plant radii: float32 rounds by 2^-24 of it, a millionth of a radius
 
-RAMP_SIZE = 16  # texels: halves evenly into mip levels, and 15 steps of 17 make 255
-UNLIT, TRANSMISSION = "KHR_materials_unlit", "KHR_materials_diffuse_transmission"
 
 _SHORT_INDICES = 65535  # vertices; index 65535 itself is reserved for primitive restart
 _LINEAR, _LINEAR_MIPMAP_LINEAR = 9729, 9987
@@ -39,18 +39,6 @@ _REPEAT, _CLAMP_TO_EDGE = 10497, 33071
 
 EncodedImages = dict[int, tuple[bytes, str]]
 """File bytes and MIME type of images already encoded, by the id of their texture or pixels."""
-
-
-def _ramp() -> npt.NDArray[np.uint8]:
-    """(RAMP_SIZE, RAMP_SIZE, 4): red grows along u, green and alpha along v, each from 0 to 255."""
-    step = np.round(np.linspace(0, 255, RAMP_SIZE)).astype(np.uint8)
-    v, u = np.meshgrid(step, step, indexing="ij")
-    return np.stack([u, v, np.zeros_like(u), v], axis=2)
-
-
-RAMP = _ramp()
-"""A texture that shows its own coordinates, so that what vertices hold (Plant.exposure) can stand
-where glTF knows textures alone: as occlusion."""
 
 
 def plant_glb(plant: Plant) -> bytes:
@@ -255,12 +243,12 @@ class _Writer:
         }
         if frames is not None:
             attributes["TANGENT"] = self._add_floats(frames)
-        exposed = plant.exposure is not None and not material.unlit
+        exposure = None if material.unlit else plant.exposure
         textured = material.color_texture is not None or material.normal_texture is not None
-        if textured or exposed or plant.uvs.any():
+        if textured or exposure is not None or plant.uvs.any():
             attributes["TEXCOORD_0"] = self._add_floats(plant.uvs[vertices])
-        if plant.exposure is not None and exposed:
-            attributes["TEXCOORD_1"] = self._add_shares(_on_ramp(plant.exposure[vertices]))
+        if exposure is not None:
+            attributes["TEXCOORD_1"] = self._add_shares(on_ramp(exposure[vertices]))
         if plant.colors is not None:
             attributes["COLOR_0"] = self._add_shares(plant.colors[vertices])
         if branches is not None and owner is not None:
@@ -269,7 +257,7 @@ class _Writer:
         return {
             "attributes": attributes,
             "indices": self._add_indices(faces.ravel(), len(vertices)),
-            "material": self._add_material(material, exposed),
+            "material": self._add_material(material, exposure is not None),
         }
 
     def _add_positions(self, positions: FloatArray) -> int:
@@ -310,8 +298,8 @@ class _Writer:
         if material.unlit:
             properties |= self._extension(UNLIT)
         elif material.transmission > 0:
-            tint = color[:3] * material.transmission_tint
-            through = _through(material.transmission, tint, surface.get("baseColorTexture"))
+            passed = material.base_color[:3] * material.transmission_tint
+            through = _through(material.transmission, passed, surface.get("baseColorTexture"))
             properties |= self._extension(TRANSMISSION, through)
         return self.document.add("materials", **properties, doubleSided=material.double_sided)
 
@@ -434,12 +422,6 @@ def _through(share: float, color: FloatArray, texture: dict[str, Any] | None) ->
         "diffuseTransmissionColorFactor": np.clip(color, 0.0, 1.0).tolist(),
     }
     return values if texture is None else {**values, "diffuseTransmissionColorTexture": texture}
-
-
-def _on_ramp(exposure: FloatArray) -> FloatArray:
-    """(v, 2) texture coordinates at which the RAMP is `exposure`, 0 to 1: between the middles of
-    its outermost texels."""
-    return np.asarray((0.5 + (RAMP_SIZE - 1) * np.clip(exposure, 0.0, 1.0)) / RAMP_SIZE)
 
 
 def _unit_normals(normals: FloatArray) -> FloatArray:

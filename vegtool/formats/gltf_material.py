@@ -7,6 +7,7 @@ KHR_materials_unlit, KHR_materials_diffuse_transmission.
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,8 +23,12 @@ from vegtool.srgb import linear_from_srgb
 
 REPEAT = 10497
 STRONGEST_TINT = 4.0
-"""Times the surface's own colour: where light that passes through is coloured by another texture,
-a mean beyond says that the two show different things."""
+"""Times the surface's own colour: a ratio beyond says that the two show different things."""
+UNLIT, TRANSMISSION = "KHR_materials_unlit", "KHR_materials_diffuse_transmission"
+_FACTOR, _COLOR_FACTOR = "diffuseTransmissionFactor", "diffuseTransmissionColorFactor"
+_TEXTURE, _COLOR_TEXTURE = "diffuseTransmissionTexture", "diffuseTransmissionColorTexture"
+_MOST = 1e18
+"""Greatest number that can be meant."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,9 +113,9 @@ def _read_material(
         texture,
         notes,
     )
-    unlit = "KHR_materials_unlit" in extensions
-    through = extensions.get("KHR_materials_diffuse_transmission", {})
-    transmission = 0.0 if unlit else _transmission(file, through, name, images, notes)
+    unlit = UNLIT in extensions
+    through = {} if unlit else _through(file, extensions.get(TRANSMISSION, {}), name, notes)
+    transmission = _transmission(file, through, name, images, notes)
     tint = np.ones(3)
     if transmission:
         tint = _transmission_tint(file, through, name, base_color, texture, images, notes)
@@ -132,6 +137,43 @@ def _read_material(
     return ReadMaterial(material, uvs)
 
 
+def _through(file: GltfFile, found: Any, name: str, notes: list[str]) -> dict[str, Any]:
+    """The extension TRANSMISSION; empty, and noted, where its values are not of its kinds."""
+    if not isinstance(found, dict):
+        return _left_out("an object", found, name, notes)
+    for key, count, expected in ((_FACTOR, 1, "a number"), (_COLOR_FACTOR, 3, "3 numbers")):
+        if key in found and not _are_numbers(found[key], count):
+            return _left_out(f"{expected} as {key}", found[key], name, notes)
+    known = range(len(file.json.get("textures", [])))
+    for key in (_TEXTURE, _COLOR_TEXTURE):
+        info = found.get(key)
+        if key in found and not (
+            isinstance(info, dict) and type(info.get("index")) is int and info["index"] in known
+        ):
+            return _left_out(f"one of the file's textures as {key}", info, name, notes)
+    return found
+
+
+def _are_numbers(value: Any, count: int) -> bool:
+    """Whether a JSON value is so many finite numbers; one alone stands in no list."""
+    numbers = [value] if count == 1 else value
+    return (
+        isinstance(numbers, list)
+        and len(numbers) == count
+        and all(type(n) in (int, float) and abs(n) <= _MOST for n in numbers)
+    )
+
+
+def _left_out(expected: str, value: Any, name: str, notes: list[str]) -> dict[str, Any]:
+    """Nothing, and a note on what was expected and found, as it stands in the file."""
+    text = json.dumps(value, ensure_ascii=False)
+    text = text if len(text) <= 60 else f"{text[:57]}..."
+    notes.append(
+        f"material {name}: {TRANSMISSION} is left out: expected {expected}, found {text}"
+    )
+    return {}
+
+
 def _transmission(
     file: GltfFile,
     through: dict[str, Any],
@@ -140,8 +182,8 @@ def _transmission(
     notes: list[str],
 ) -> float:
     """The share of light that passes through, 0 to 1; of a texture of shares, its mean."""
-    share = float(through.get("diffuseTransmissionFactor", 0.0))
-    texture, _ = _texture(file, through.get("diffuseTransmissionTexture"), images, notes)
+    share = float(through.get(_FACTOR, 0.0))
+    texture, _ = _texture(file, through.get(_TEXTURE), images, notes)
     if texture is not None and share > 0:
         share *= float(texture.pixels[..., 3].mean()) / 255
         notes.append(
@@ -163,26 +205,41 @@ def _transmission_tint(
     """(3,) linear: the colour of light that passes through over the surface's own.
 
     Exact where both have the same texture or none; else the ratio of their means, which is noted.
+    At most STRONGEST_TINT, and such that its product with the surface's own colour, which is what a
+    file holds, lies in 0..1; what was more is noted.
     """
-    factor = np.array(through.get("diffuseTransmissionColorFactor", [1, 1, 1]), dtype=np.float64)
+    factor = np.array(through.get(_COLOR_FACTOR, [1, 1, 1]), dtype=np.float64)
     factor = np.clip(factor, 0.0, None)
-    other, _ = _texture(file, through.get("diffuseTransmissionColorTexture"), images, notes)
+    other, _ = _texture(file, through.get(_COLOR_TEXTURE), images, notes)
     own = base_color[:3]
-    if other is texture:
-        return _ratio(factor, own)
-    tint = _ratio(factor * _mean_color(other), own * _mean_color(texture))
-    tint = np.clip(tint, 0.0, STRONGEST_TINT)
-    red, green, blue = tint
-    notes.append(
-        f"material {name}: light that passes through has another texture than the surface; it is "
-        f"coloured as the surface, times ({red:.2g}, {green:.2g}, {blue:.2g}), the ratio of means"
-    )
+    same = other is texture
+    if same:
+        full = _ratio(factor, own)
+    else:
+        full = _ratio(factor * _mean_color(other), own * _mean_color(texture))
+    most = np.minimum(_ratio(np.ones(3), own), STRONGEST_TINT)
+    tint = np.minimum(full, most)
+    times = f"it is coloured as the surface, times {_triple(tint)}"
+    cut = bool((full > most * (1 + 1e-9)).any())
+    brighter = f"{_triple(full)} would be brighter than a file can hold, or than can be meant"
+    if not same:
+        notes.append(
+            f"material {name}: light that passes through has another texture than the surface; "
+            f"{times}, the ratio of means{f'; {brighter}' if cut else ''}"
+        )
+    elif cut:
+        notes.append(f"material {name}: light that passes through is too bright; {times}; {brighter}")
     return tint
+
+
+def _triple(color: FloatArray) -> str:
+    return f"({', '.join(f'{channel:.2g}' for channel in color)})"
 
 
 def _ratio(light: FloatArray, own: FloatArray) -> FloatArray:
     """(3,) light / own; 1 where the surface's own colour is 0, which no tint can change."""
-    return np.divide(light, own, out=np.ones(3), where=own > 0)
+    with np.errstate(over="ignore"):
+        return np.divide(light, own, out=np.ones(3), where=own > 0)
 
 
 def _mean_color(texture: Texture | None) -> FloatArray:

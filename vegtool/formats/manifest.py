@@ -15,6 +15,7 @@ from typing import Any
 
 import vegtool
 from vegtool.errors import InputError
+from vegtool.formats.ramp import written_texels
 from vegtool.lod import FADE_FRACTION, Level, LodChain, Measured, ShadowProxy, Spread
 
 VERSION = 1  # of the schema: one more when a reader of the last one would misread the file
@@ -86,7 +87,7 @@ def _level(chain: LodChain, level: Level, file: LevelFile) -> dict[str, Any]:
         "kind": level.kind,
         "triangles": level.triangles,
         "billboards": 0 if level.billboards is None else len(level.billboards),
-        "texels": level.texels,
+        "texels": written_texels(level),
         "bytes": file.bytes,
         "switch_distance_m": distance,
         "fade_start_m": distance,
@@ -107,7 +108,7 @@ def _shadow(proxy: ShadowProxy, file: LevelFile | None) -> dict[str, Any]:
     return {
         "file": file.name,
         "triangles": proxy.level.triangles,
-        "texels": proxy.level.texels,
+        "texels": written_texels(proxy.level),
         "bytes": file.bytes,
         "pixels": proxy.pixels,
         "suns": proxy.suns,
