@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
+from dataclasses import fields, replace
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -14,6 +16,7 @@ import pytest
 
 from vegtool.batch import find_jobs
 from vegtool.cli import run
+from vegtool.convert import ConvertOptions
 from vegtool.errors import UsageError
 from vegtool.formats.gltf import plant_glb
 from vegtool.formats.manifest import read_manifest
@@ -316,6 +319,38 @@ def test_inspect_tells_what_was_read(model: Path, capsys: pytest.CaptureFixture[
     assert sum(found["branches"]["per_level"]) == found["branches"]["count"]
     assert run(["inspect", str(model)]) == 0
     assert "triangles" in capsys.readouterr().out
+
+
+def test_inspect_tells_what_light_does_to_a_material(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    plant = sample("bush", 600)
+    first, *others = plant.materials
+    lit = (replace(first, unlit=True), *(replace(m, transmission=0.4) for m in others))
+    path = tmp_path / "bush.glb"
+    path.write_bytes(plant_glb(replace(plant, materials=lit)))
+    assert run(["inspect", str(path), "--json"]) == 0
+    materials = json.loads(capsys.readouterr().out)["materials"]
+    assert [(m["unlit"], m["transmission"]) for m in materials] == [(True, 0), (False, 0.4)]
+    assert run(["inspect", str(path)]) == 0
+    said = capsys.readouterr().out
+    rows = {m["name"]: next(r for r in said.splitlines() if m["name"] in r) for m in materials}
+    assert [row.split("  ")[-1].strip() for row in rows.values()] == ["unlit", "passes 0.40"]
+
+
+def test_help_shows_what_stands_in_brackets(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Rich takes [words] for styles and drops them; what is meant as one is still one."""
+    monkeypatch.setenv("COLUMNS", "500")
+    assert run(["convert", "--help"]) == 0
+    said = capsys.readouterr().out
+    helps = {f.metadata["help"] for f in fields(ConvertOptions)}
+    bracketed = [words for text in helps for words in re.findall(r"\[[^]]*\]", text)]
+    assert bracketed, "or this shows nothing"
+    for words in bracketed:
+        assert words in said
+    assert "\\[" not in said and "[bold]" not in said and "Examples" in said
 
 
 def test_inspect_writes_branches(model: Path, tmp_path: Path) -> None:

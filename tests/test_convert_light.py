@@ -204,7 +204,7 @@ def test_crown_normals_are_those_of_the_levels_alone(bush: Plant) -> None:
 @pytest.mark.gl
 @pytest.mark.parametrize("refine", ["full", "none"])
 def test_an_unlit_plant_has_unlit_levels_in_its_own_colours(refine: str) -> None:
-    """Colours are what is seen: the mean of what a level covers is the plant's, without any light."""
+    """Colours are what is seen: what a level covers has the mean colour of the plant, unlit."""
     plant = sample("bush", 600)
     unlit = replace(plant, materials=tuple(replace(m, unlit=True) for m in plant.materials))
     options = ConvertOptions(refine=refine, billboards=40, levels=1)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import re
+import tomllib
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -108,7 +110,7 @@ def test_the_whole_scene_names_every_key(tmp_path: Path) -> None:
 
 def test_an_empty_scene_says_nothing(tmp_path: Path) -> None:
     scene = read_scene(written(tmp_path, "# nothing yet\n"))
-    assert (scene.camera, scene.light, unused(scene)) == (Camera(), None, [])
+    assert (scene.camera, scene.light, unused(scene, ConvertOptions())) == (Camera(), None, [])
     assert with_scene(ConvertOptions(), scene) == ConvertOptions()
 
 
@@ -136,6 +138,35 @@ def test_places_are_the_lines_that_a_person_sees(tmp_path: Path) -> None:
     assert scene.at("placement", "inventory").endswith("line 3")
     assert scene.at("camera", "above").endswith("line 7")
     assert scene.at("light", "moves") == str(scene.path), "not there"
+
+
+def test_each_statement_is_parsed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However its lines end: the whole file, and each part of it, so that time grows as its length.
+
+    Brackets, quotes and hashes in strings and comments end nothing.
+    """
+    corners = "".join(f"  [{i}, {i * i}]  # corner ]{i}, 'north\n  , # \"[\n" for i in range(2_500))
+    text = (
+        f'[camera] # ]\npath = "a ] # \\" b"\npolygon = [\n{corners}]\nabove = true\n'
+        "[placement]\ninventory = '''\n]\"\n''''\n"
+        'columns.\'x]\' = """\n{\\""\n""""\nseed = 3'
+    )
+    lengths: list[int] = []
+    loads = tomllib.loads
+
+    def counted(text: str) -> dict[str, Any]:
+        lengths.append(len(text))
+        return loads(text)
+
+    monkeypatch.setattr("vegtool.scene.tomllib.loads", counted)
+    scene = read_scene(written(tmp_path, text))
+    assert len(lengths) == 1 + 8
+    assert sum(lengths) <= 2 * len(text) + 1
+    assert len(scene.camera.polygon) == 2_500
+    lines = text.split("\n")
+    for place in (("camera", "polygon"), ("camera", "above"), ("placement", "seed")):
+        number = int(scene.at(*place).split("line ")[1])
+        assert lines[number - 1].startswith(place[-1])
 
 
 def test_a_long_list_is_read_in_no_time(tmp_path: Path) -> None:
@@ -177,9 +208,28 @@ def test_a_long_list_is_read_in_no_time(tmp_path: Path) -> None:
         ("[camera]\nimage_height_px = 9", "image_height_px: expected at least 16; got 9"),
         ("[camera]\npath = ''", "path: expected text in quotes; got ''"),
         ("[camera]\nheight_m = [3, 2]", "height_m: expected two numbers, [low, high]; got [3, 2]"),
-        ("[camera]\npolygon = [[0, 1]]", "polygon: expected three points at least, [[x, z], "),
+        ("[camera]\npolygon = [[0, 1]]", "polygon: expected three points at least that are not"),
+        ("[camera]\npolygon = [[0, 1], [2, 3]]", "line 2: polygon: expected three points at least"),
+        ("[camera]\npolygon = []", "line 2: polygon: expected three points at least"),
+        (
+            "[camera]\npolygon = [[0, 1], [2, 3], [0, 1], [2, 3]]",
+            "line 2: polygon: expected three points at least that are not on one line",
+        ),
+        (
+            "[camera]\npolygon = [[0.1, 0.1], [0.2, 0.2], [0.7, 0.7]]",
+            "line 2: polygon: expected three points at least that are not on one line",
+        ),
         ("[camera]\nabove = {}", "above: expected true or false; got a table"),
         ("[terrain]\nkind = 'hill'", "kind: expected one of none, plane, heightmap; got hill"),
+        ("[terrain]\nextent_m = [0, 5]", "line 2: extent_m: expected more than 0; got 0"),
+        ("[terrain]\nextent_m = [5, -5]", "line 2: extent_m: expected more than 0; got -5"),
+        (
+            "[terrain]\nextent_m = [5, 5]\nkind = 'heightmap'",
+            'FILE, line 3: kind is "heightmap": expected heightmap in [terrain], text in quotes',
+        ),
+        ("[budget]\nframe_ms = 0", "line 2: frame_ms: expected more than 0; got 0"),
+        ("[budget]\nbytes = 0", "line 2: bytes: expected at least 1; got 0"),
+        ("[budget]\ntriangles = 0", "line 2: triangles: expected at least 1; got 0"),
         ("[[species]]\nslope_deg = [0, 95]", "slope_deg: expected at most 90; got 95"),
         ("[placement]\ncolumns = { x = 3 }", "columns: expected names in quotes, { x ="),
         ("[placement]\nseed = -1", "seed: expected at least 0; got -1"),
@@ -251,7 +301,7 @@ def test_a_still_sun_that_nobody_placed_is_left_to_the_options(tmp_path: Path) -
 
 def test_what_is_not_used_is_said(tmp_path: Path) -> None:
     scene = read_scene(written(tmp_path, WHOLE))
-    (sentence,) = unused(scene)
+    (sentence,) = unused(scene, ConvertOptions(prelit=True))
     assert sentence.startswith(f"{scene.path}: checked, but of no effect on convert yet: ")
     listed = sentence.split("yet: ")[1].split(", ")
     assert listed == [
@@ -259,6 +309,14 @@ def test_what_is_not_used_is_said(tmp_path: Path) -> None:
         "[camera] path", "[camera] polygon", "[camera] height_m", "[camera] above",
         "[camera] margin_m",
     ]  # fmt: skip
+
+
+def test_a_sun_that_is_not_baked_is_said_to_change_nothing(tmp_path: Path) -> None:
+    for moves in ("true", "false"):
+        scene = read_scene(written(tmp_path, f"[light]\nmoves = {moves}\nsun = [10, 20]"))
+        (sentence,) = unused(scene, ConvertOptions())
+        assert sentence.startswith(f"{scene.path}, line 3: sun changes nothing without --prelit: ")
+    assert unused(scene, ConvertOptions(prelit=True)) == []
 
 
 def test_the_page_describes_every_key_as_it_is() -> None:
@@ -298,7 +356,9 @@ def test_convert_takes_its_sun_and_camera_from_the_scene(
     assert converted(tmp_path, text, "--prelit", "--json") == 0
     said = capsys.readouterr()
     assert "of no effect on convert yet: [budget]" in said.err
-    assert json.loads(said.out)[0]["error"] is None
+    (row,) = json.loads(said.out)
+    assert row["error"] is None
+    assert [n for n in row["notes"] if "of no effect on convert yet: [budget]" in n]
     values = read_manifest(tmp_path / "out" / "bush.lod.json")
     assert values["fov_y_deg"] == 50
     assert (values["sun"]["azimuth_deg"], values["sun"]["elevation_deg"]) == (90, 30)

@@ -56,9 +56,9 @@ def inspection_text(inspection: dict[str, Any]) -> str:
     size = " x ".join(f"{s:.3g}" for s in high - low)
     materials = [
         (
-            m["name"], m["role"], f"{m['triangles']:,}", m["alpha"], m["texture"], m["sides"],
-            _light(m),
-        )  # fmt: skip
+            *(m["name"], m["role"], f"{m['triangles']:,}", m["alpha"]),
+            *(m["texture"], m["sides"], _light(m)),
+        )
         for m in inspection["materials"]
     ]
     branches = inspection["branches"]

@@ -177,6 +177,23 @@ def test_the_tint_is_that_of_most_of_the_light_that_passes() -> None:
     np.testing.assert_allclose(level.atlas.transmission_tint, [0.5, 0.5, 0])
 
 
+def test_the_tint_is_that_of_what_is_seen_to_pass_and_a_file_can_hold_it() -> None:
+    """Leaves of a quarter of the luminance count a quarter; a tint beyond 1 is no factor of a
+    texture; black leaves show none."""
+    green = [0, 1.0, 0, 1]
+    dim = [0, 0.25, 0, 1]
+    pair = (
+        leaf(base_color=green, transmission=0.4, transmission_tint=[1.0, 0.5, 0]),
+        leaf(base_color=dim, transmission=0.4, transmission_tint=[0, 1.0, 4.0]),
+    )
+    plant = quads([[0, 0, 0], [5, 0, 0]], materials=pair, face_material=[0, 1])
+    np.testing.assert_allclose(transmission_tint(plant), [0.8, 0.6, 0.8])
+    bright = tuple(replace(m, transmission_tint=[3.0, 1.0, 0.5]) for m in pair)
+    np.testing.assert_allclose(transmission_tint(replace(plant, materials=bright)), [1, 1, 0.5])
+    black = tuple(replace(m, base_color=[0, 0, 0, 1]) for m in bright)
+    np.testing.assert_array_equal(transmission_tint(replace(plant, materials=black)), np.ones(3))
+
+
 def test_light_changes_nothing_else_of_a_bake() -> None:
     plant = leafy(np.random.default_rng(4), 50)
     labels = (np.arange(50) % 5).astype(np.int32)

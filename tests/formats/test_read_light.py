@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from made import QUAD_UV, Gltf, png
 
-from vegtool.errors import InputError
 from vegtool.formats import read_plant
 from vegtool.plant import Material
 
@@ -114,7 +113,82 @@ def test_a_share_beyond_all_is_all(tmp_path: Path) -> None:
     assert Leaf().read(tmp_path, {}, **through(factor=1.5))[0].transmission == 1.0
 
 
-@pytest.mark.parametrize("value", ["much", [1], None])
-def test_a_share_that_is_no_number_is_refused(tmp_path: Path, value: Any) -> None:
-    with pytest.raises(InputError):
-        Leaf().read(tmp_path, {}, **through(factor=value))
+@pytest.mark.parametrize(
+    ("values", "says"),
+    [
+        ({"factor": "much"}, 'a number as diffuseTransmissionFactor, found "much"'),
+        ({"factor": [1]}, "a number as diffuseTransmissionFactor, found [1]"),
+        ({"factor": True}, "a number as diffuseTransmissionFactor, found true"),
+        ({"factor": None}, "a number as diffuseTransmissionFactor, found null"),
+        ({"factor": float("nan")}, "a number as diffuseTransmissionFactor, found NaN"),
+        ({"factor": 10**400}, "a number as diffuseTransmissionFactor, found 1000"),
+        ({"color": None}, "3 numbers as diffuseTransmissionColorFactor, found null"),
+        ({"color": [1, 1]}, "3 numbers as diffuseTransmissionColorFactor, found [1, 1]"),
+        ({"color": 1}, "3 numbers as diffuseTransmissionColorFactor, found 1"),
+        (
+            {"color": [1, 1, float("inf")]},
+            "3 numbers as diffuseTransmissionColorFactor, found [1, 1, Infinity]",
+        ),
+        (
+            {"colors": None},
+            "one of the file's textures as diffuseTransmissionColorTexture, found null",
+        ),
+        ({"texture": {}}, "one of the file's textures as diffuseTransmissionTexture, found {}"),
+        (
+            {"texture": {"index": 7}},
+            'one of the file\'s textures as diffuseTransmissionTexture, found {"index": 7}',
+        ),
+    ],
+)
+def test_values_of_other_kinds_leave_the_extension_out(
+    tmp_path: Path, values: dict[str, Any], says: str
+) -> None:
+    """The plant without light that passes through is still the plant."""
+    material, (note,) = Leaf().read(tmp_path, {}, **through(**{"factor": 0.5, **values}))
+    assert material.transmission == 0.0
+    assert material.transmission_tint.tolist() == [1, 1, 1]
+    assert note.startswith(f"material leaf: {TRANSMISSION} is left out: expected {says}")
+
+
+def test_where_a_texture_of_shares_lies_does_not_matter(tmp_path: Path) -> None:
+    """Its mean is taken: coordinates that make no sense refuse nothing."""
+    leaf = Leaf()
+    info = {**leaf.texture(WHITE), "texCoord": None, "extensions": {"KHR_texture_transform": []}}
+    material, notes = leaf.read(tmp_path, {}, **through(factor=0.5, texture=info))
+    assert (material.transmission, len(notes)) == (0.5, 1)
+
+
+def test_an_extension_that_is_no_object_is_left_out(tmp_path: Path) -> None:
+    material, (note,) = Leaf().read(tmp_path, {}, **{TRANSMISSION: None})  # type: ignore[arg-type]
+    assert material.transmission == 0.0
+    assert note.endswith("is left out: expected an object, found null")
+
+
+@pytest.mark.parametrize("textured", [False, True])
+def test_a_surface_that_is_nearly_black_is_tinted_no_more_than_can_be_meant(
+    tmp_path: Path, textured: bool
+) -> None:
+    """1 over 0.001 would be a thousand times the colour, which no picture of levels can hold."""
+    leaf = Leaf()
+    info = {"baseColorTexture": leaf.texture(GRAY)} if textured else {}
+    more = {"colors": info["baseColorTexture"]} if textured else {}
+    material, (note,) = leaf.read(
+        tmp_path,
+        {"baseColorFactor": [1e-3, 0.5, 1, 1], **info},
+        **through(factor=0.5, color=[1, 0.5, 0.5], **more),
+    )
+    assert np.allclose(material.transmission_tint, [4, 1, 0.5])
+    assert note == (
+        "material leaf: light that passes through is too bright; it is coloured as the surface, "
+        "times (4, 1, 0.5); (1e+03, 1, 0.5) would be brighter than a file can hold, or than can be "
+        "meant"
+    )
+
+
+def test_a_ratio_of_means_is_no_brighter_than_a_file_can_hold(tmp_path: Path) -> None:
+    """White over grey is twice as bright: as factor of the surface's own texture, at most 1."""
+    leaf = Leaf()
+    surface = {"baseColorFactor": [1, 0.8, 0.4, 1], "baseColorTexture": leaf.texture(GRAY)}
+    material, (note,) = leaf.read(tmp_path, surface, **through(factor=0.5))
+    assert np.allclose(material.transmission_tint, [1, 1.25, 2.5])
+    assert "the ratio of means; (2, 2.5, 5) would be brighter than" in note

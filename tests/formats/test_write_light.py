@@ -9,19 +9,20 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
+from made import QUAD_UV, Gltf, png
 from PIL import Image
 from written import Glb, billboard_level, hybrid_level, leafy_plant, parse, small_chain
 
 from vegtool.formats import read_plant
 from vegtool.formats.gltf import (
-    RAMP,
     chain_glb,
     file_names,
     level_glb,
     plant_glb,
     write_chain,
 )
-from vegtool.formats.manifest import read_manifest, schema
+from vegtool.formats.manifest import LevelFile, manifest, read_manifest, schema
+from vegtool.formats.ramp import RAMP, written_texels
 from vegtool.lod import Level
 from vegtool.plant import Plant
 
@@ -93,6 +94,37 @@ def test_without_textures_it_is_read_back_too(tmp_path: Path) -> None:
     leaf = read_back(plant_glb(plant), tmp_path).materials[1]
     assert leaf.transmission == 0.25
     assert np.allclose(leaf.transmission_tint, [0.5, 1, 0.1], rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("color", [[1, 1, 1], [0.9, 0.4, 0.1], [1e-3, 0.5, 0]])
+@pytest.mark.parametrize("base", [[1, 0.8, 0.4, 1], [1e-3, 0.5, 0.01, 1], [1.5, 0.9, 0, 1]])
+@pytest.mark.parametrize("textured", ["both", "surface", "neither"])
+def test_what_is_read_is_what_is_written(
+    tmp_path: Path, base: list[float], color: list[float], textured: str
+) -> None:
+    """Colours that pass through are those that pictures of the plant are drawn with: the surface's
+    own times the tint."""
+    made = Gltf()
+    info = {"index": made.image(png(np.full((2, 2, 3), 90, np.uint8)))}
+    surface = {"baseColorFactor": base}
+    values = {"diffuseTransmissionFactor": 0.5, "diffuseTransmissionColorFactor": color}
+    if textured != "neither":
+        surface |= {"baseColorTexture": info}
+    if textured == "both":
+        values |= {"diffuseTransmissionColorTexture": info}
+    entry = made.material(pbrMetallicRoughness=surface, extensions={TRANSMISSION: values})
+    made.node(mesh=made.mesh(material=entry, TEXCOORD_0=QUAD_UV))
+    plant = read_plant(made.write(tmp_path / "leaf.glb"))
+    (material,) = plant.materials
+    assert 0 <= material.transmission_tint.min() <= material.transmission_tint.max() <= 4
+    drawn = material.base_color[:3] * material.transmission_tint
+    stored = parse(plant_glb(plant)).material()
+    through = stored["extensions"][TRANSMISSION]
+    assert np.allclose(through["diffuseTransmissionColorFactor"], drawn, rtol=0, atol=1e-12)
+    texture = stored["pbrMetallicRoughness"].get("baseColorTexture")
+    assert through.get("diffuseTransmissionColorTexture") == texture
+    if textured != "surface" and not [n for n in plant.notes if "would be brighter than" in n]:
+        assert np.allclose(drawn, np.where(material.base_color[:3] > 0, color, 0))
 
 
 def test_transmitted_light_is_no_brighter_than_all_that_comes() -> None:
@@ -237,6 +269,25 @@ def test_a_chain_of_all_kinds_shares_one_ramp() -> None:
     names = [image["name"] for image in glb.json["images"]]
     assert len(names) == len(set(names)), "each image once"
     assert names.count("exposure_ramp") == 1
+
+
+def test_the_ramp_counts_as_texels_where_it_is_written() -> None:
+    """16 x 16: of the original and of a level that is a mesh; not of unlit ones or of an atlas."""
+    plant = replace(with_leaf(transmission=0.3), exposure=EXPOSURE)
+    unlit = tuple(replace(m, unlit=True) for m in plant.materials)
+    meshes = [plant, replace(plant, exposure=None), replace(plant, materials=unlit)]
+    levels = [Level("mesh", mesh=mesh) for mesh in meshes]
+    exposed, plain, without = levels
+    assert written_texels(exposed) == plain.texels + 256
+    assert written_texels(plain) == written_texels(without) == plain.texels
+    atlas = lit_level()
+    assert written_texels(atlas) == atlas.texels
+    for level in levels:
+        names = {i["name"] for i in parse(level_glb(level, "x")).json["images"]}
+        assert ("exposure_ramp" in names) == (level is exposed)
+    chain = small_chain(levels=(exposed, replace(plain, near_distance_m=5.0)))
+    rows = manifest(chain, [LevelFile("x.glb", 1)] * 2)["levels"]
+    assert [row["texels"] for row in rows] == [plain.texels + 256, plain.texels]
 
 
 def test_writing_leaves_the_plant_as_it_was() -> None:

@@ -20,7 +20,7 @@ from vegtool.growth import sample
 from vegtool.lighting.light import Light
 from vegtool.lod import Atlas, Billboards, Display, Level
 from vegtool.measure.background import bytes_over
-from vegtool.measure.contact_sheet import contact_sheet
+from vegtool.measure.contact_sheet import _caption, contact_sheet
 from vegtool.measure.options import MeasureOptions
 from vegtool.measure.pictures import client_plant, fragments, frame_seconds, live, truth
 from vegtool.measure.views import Camera, direction, framed
@@ -157,6 +157,14 @@ def test_far_from_the_origin_the_picture_is_the_same() -> None:
 def test_half_the_light_over_white_is_not_half_the_grey() -> None:
     half = np.array([[[0.0, 0, 0, 0.5]]], np.float32)
     assert bytes_over(half, (1, 1, 1))[0, 0, 0] == 188, "linear 0.5 is sRGB 188"
+
+
+def test_a_caption_agrees_with_what_is_written() -> None:
+    """A mesh of known exposure has an image on disk, the ramp that its exposure is looked up in."""
+    plant = square(Material("m"))
+    exposed = replace(plant, exposure=np.ones((len(plant.positions), 2)))
+    for mesh, says in ((plant, "no textures"), (exposed, "no textures, but a ramp for exposure")):
+        assert says in [text for text, _ in _caption(Level("mesh", mesh=mesh), 1)]
 
 
 def test_contact_sheet_is_the_one_that_was_looked_at() -> None:

@@ -31,7 +31,14 @@ from vegtool.refine.balance import (
     ridge,
 )
 from vegtool.refine.bend import Bend, bent
-from vegtool.refine.brightness import PIXELS, SUPERSAMPLE, VIEWS, Brightness, brightness_of
+from vegtool.refine.brightness import (
+    LOW_VIEWS,
+    PIXELS,
+    SUPERSAMPLE,
+    VIEWS,
+    Brightness,
+    brightness_of,
+)
 from vegtool.refine.color import LEAST_GAIN, MOST_GAIN, luminances, scaled
 from vegtool.refine.drawn import drawn
 from vegtool.refine.retouch import turned
@@ -219,7 +226,7 @@ def error(level: Level, buffers: PlantBuffers) -> float:
 
 @pytest.mark.gl
 def test_brightness_is_that_of_what_is_drawn(tree: Tree) -> None:
-    assert tree.wanted.values.shape == (VIEWS, len(tree.wanted.lights))
+    assert tree.wanted.values.shape == (VIEWS + LOW_VIEWS, len(tree.wanted.lights))
     for view in (0, VIEWS // 2, VIEWS - 1):
         for number in (0, 5, len(tree.wanted.lights) - 1):
             shot = shot_of(tree.wanted.cameras[view])

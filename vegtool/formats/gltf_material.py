@@ -144,14 +144,15 @@ def _through(file: GltfFile, found: Any, name: str, notes: list[str]) -> dict[st
     for key, count, expected in ((_FACTOR, 1, "a number"), (_COLOR_FACTOR, 3, "3 numbers")):
         if key in found and not _are_numbers(found[key], count):
             return _left_out(f"{expected} as {key}", found[key], name, notes)
-    known = range(len(file.json.get("textures", [])))
+    known, values = range(len(file.json.get("textures", []))), dict(found)
     for key in (_TEXTURE, _COLOR_TEXTURE):
-        info = found.get(key)
-        if key in found and not (
-            isinstance(info, dict) and type(info.get("index")) is int and info["index"] in known
-        ):
-            return _left_out(f"one of the file's textures as {key}", info, name, notes)
-    return found
+        if key not in found:
+            continue
+        index = found[key].get("index") if isinstance(found[key], dict) else None
+        if type(index) is not int or index not in known:
+            return _left_out(f"one of the file's textures as {key}", found[key], name, notes)
+        values[key] = {"index": index}  # means are taken of it, so that coordinates do not matter
+    return values
 
 
 def _are_numbers(value: Any, count: int) -> bool:
@@ -168,9 +169,7 @@ def _left_out(expected: str, value: Any, name: str, notes: list[str]) -> dict[st
     """Nothing, and a note on what was expected and found, as it stands in the file."""
     text = json.dumps(value, ensure_ascii=False)
     text = text if len(text) <= 60 else f"{text[:57]}..."
-    notes.append(
-        f"material {name}: {TRANSMISSION} is left out: expected {expected}, found {text}"
-    )
+    notes.append(f"material {name}: {TRANSMISSION} is left out: expected {expected}, found {text}")
     return {}
 
 
@@ -228,7 +227,9 @@ def _transmission_tint(
             f"{times}, the ratio of means{f'; {brighter}' if cut else ''}"
         )
     elif cut:
-        notes.append(f"material {name}: light that passes through is too bright; {times}; {brighter}")
+        notes.append(
+            f"material {name}: light that passes through is too bright; {times}; {brighter}"
+        )
     return tint
 
 

@@ -91,7 +91,8 @@ def _magnified(picture: ByteArray) -> ByteArray:
 
 def _caption(level: Level, number: int) -> list[tuple[str, tuple[int, int, int]]]:
     shown, atlas = f"{level.triangles:,} triangles", "no textures"
-    if level.mesh is not None and level.mesh.exposure is not None and not level.unlit:
+    mesh = level.mesh
+    if mesh is not None and mesh.exposure is not None and not all(m.unlit for m in mesh.materials):
         atlas = "no textures, but a ramp for exposure"
     if level.billboards is not None and level.atlas is not None:
         height, width = level.atlas.color.shape[:2]
