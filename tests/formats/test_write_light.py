@@ -127,6 +127,18 @@ def test_what_is_read_is_what_is_written(
         assert np.allclose(drawn, np.where(material.base_color[:3] > 0, color, 0))
 
 
+def test_light_through_coloured_vertices_has_their_mean_colour() -> None:
+    """glTF multiplies the base colour by COLOR_0 and not what passes: it would pass as white."""
+    plant = with_leaf(transmission=0.4, color_texture=None, base_color=[1, 1, 1, 1.0])
+    colors = np.ones((len(plant.positions), 4))
+    colors[:, :3] = [0.1, 0.5, 0.05]
+    found = parse(plant_glb(replace(plant, colors=colors))).json["materials"]
+    through = [m["extensions"][TRANSMISSION] for m in found if "extensions" in m]
+    assert [t["diffuseTransmissionColorFactor"] for t in through] == [
+        pytest.approx([0.1, 0.5, 0.05])
+    ]
+
+
 def test_transmitted_light_is_no_brighter_than_all_that_comes() -> None:
     glb = parse(plant_glb(with_leaf(transmission=0.5, transmission_tint=[3.0, 1, 1])))
     through = glb.material(0, 1)["extensions"][TRANSMISSION]

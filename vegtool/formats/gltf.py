@@ -257,7 +257,7 @@ class _Writer:
         return {
             "attributes": attributes,
             "indices": self._add_indices(faces.ravel(), len(vertices)),
-            "material": self._add_material(material, exposure is not None),
+            "material": self._add_material(material, exposure is not None, _mean(plant, chosen)),
         }
 
     def _add_positions(self, positions: FloatArray) -> int:
@@ -276,8 +276,10 @@ class _Writer:
         dtype = np.uint16 if vertices <= _SHORT_INDICES else np.uint32
         return self.document.add_accessor(indices.astype(dtype), ELEMENT_ARRAY_BUFFER)
 
-    def _add_material(self, material: Material, exposed: bool) -> int:
-        """exposed: whether TEXCOORD_1 lays the exposure of vertices on the RAMP."""
+    def _add_material(self, material: Material, exposed: bool, mean: FloatArray) -> int:
+        """exposed: whether TEXCOORD_1 lays the exposure of vertices on the RAMP. mean: (3,) of the
+        vertices' colours, which light that passes through has for want of a texture: unlike the
+        base colour, glTF does not multiply it by COLOR_0."""
         color = np.clip(material.base_color, 0.0, 1.0)
         surface: dict[str, Any] = {
             "baseColorFactor": color.tolist(),
@@ -299,6 +301,8 @@ class _Writer:
             properties |= self._extension(UNLIT)
         elif material.transmission > 0:
             passed = material.base_color[:3] * material.transmission_tint
+            if material.color_texture is None:
+                passed = passed * mean
             through = _through(material.transmission, passed, surface.get("baseColorTexture"))
             properties |= self._extension(TRANSMISSION, through)
         return self.document.add("materials", **properties, doubleSided=material.double_sided)
@@ -412,6 +416,15 @@ def _split_by_group(faces: IntArray, group: IntArray) -> tuple[IntArray, IntArra
         renumbered.reshape(-1, 3).astype(np.int32),
         owner.astype(np.int32),
     )
+
+
+def _mean(plant: Plant, chosen: npt.NDArray[np.bool_]) -> FloatArray:
+    """(3,) mean of the vertex colours of some faces, (f,) bool, by area; white where there are
+    none."""
+    area = plant.face_areas[chosen]
+    if plant.colors is None or not area.sum() > 0:
+        return np.ones(3)
+    return np.asarray(area @ plant.colors[plant.faces[chosen], :3].mean(axis=1) / area.sum())
 
 
 def _through(share: float, color: FloatArray, texture: dict[str, Any] | None) -> dict[str, Any]:
