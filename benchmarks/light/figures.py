@@ -31,6 +31,8 @@ from vegtool.refine.occlusion import exposed
 CELL, GAP, LINE = 300, 10, 24
 PAPER, INK = (250, 250, 248), (30, 34, 38)
 VIEWS = {"side": direction(0.0, 8.0), "top": direction(0.0, 80.0)}
+SHOWN = 0.7
+"""Of a picture of the plant's bounding ball: all of a tree."""
 FLAT = (128, 128, 255)
 QUALITY = 80
 
@@ -74,6 +76,8 @@ def _shown(level: Level, camera: Camera, light: Light) -> Picture:
 
 def _cell(picture: Picture) -> ByteArray:
     image = Image.fromarray(bytes_over(picture))
+    edge = int(image.width * (1 - SHOWN) / 2)
+    image = image.crop((edge, edge, image.width - edge, image.height - edge))
     return np.asarray(image.resize((CELL, CELL), Image.Resampling.NEAREST))
 
 
