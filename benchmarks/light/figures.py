@@ -31,7 +31,7 @@ from vegtool.refine.occlusion import exposed
 CELL, GAP, LINE = 300, 10, 24
 PAPER, INK = (250, 250, 248), (30, 34, 38)
 VIEWS = {"side": direction(0.0, 8.0), "top": direction(0.0, 80.0)}
-SHOWN = 0.7
+SHOWN = 0.8
 """Of a picture of the plant's bounding ball: all of a tree."""
 FLAT = (128, 128, 255)
 QUALITY = 80
