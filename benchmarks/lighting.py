@@ -22,7 +22,7 @@ from tempfile import TemporaryDirectory
 from judge.plants import MODELS, QUICK, ROOT, wanted
 from light import crown, prelit, relighting, shadows, turning
 from light.tables import tables
-from recorded import record
+from recorded import record, written
 
 from vegtool import __version__
 from vegtool.convert import ConvertOptions, convert
@@ -122,12 +122,6 @@ def prelit_missed(rows: Sequence[Row]) -> list[str]:
     return told
 
 
-def written(text: str) -> None:
-    """Put between the two marks of the page."""
-    before, _, after = PAGE.read_text(encoding="utf-8").split(MARK)
-    PAGE.write_text(f"{before}{MARK}\n\n{text}\n\n{MARK}{after}", encoding="utf-8")
-
-
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("plants", nargs="*", help=f"{', '.join(MODELS)}, or files")
@@ -162,7 +156,7 @@ def main() -> int:
         for part, rows in found.items():
             record(PARTS[part].file, [{"version": __version__, **row} for row in rows])
     if known.markdown:
-        written(tables(found))
+        written(PAGE, MARK, tables(found))
     return 1 if missed else 0
 
 

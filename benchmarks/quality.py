@@ -31,7 +31,7 @@ from judge.plants import MODELS, QUICK, ROOT, wanted
 from judge.points import Point, points_of
 from judge.sitting import VIEWS
 from judge.tables import line, markdown, rows, summary
-from recorded import record
+from recorded import record, written
 
 from vegtool import __version__
 
@@ -48,12 +48,6 @@ def seconds(model: Path, options: str, folder: Path) -> tuple[float, float]:
     ]
     mine, plain = map(median, zip(*runs, strict=True))
     return mine, plain
-
-
-def written(text: str) -> None:
-    """Put between the two marks of the page."""
-    before, _, after = PAGE.read_text(encoding="utf-8").split(MARK)
-    PAGE.write_text(f"{before}{MARK}\n\n{text}\n\n{MARK}{after}", encoding="utf-8")
 
 
 def main() -> int:
@@ -102,7 +96,7 @@ def main() -> int:
     if known.record:
         record("quality", rows(found))
     if known.markdown:
-        written(markdown(found, times))
+        written(PAGE, MARK, markdown(found, times))
     return 1 if missed else 0
 
 

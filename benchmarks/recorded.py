@@ -1,4 +1,4 @@
-"""Rows of a benchmark, appended to its file of results."""
+"""What a benchmark found: rows in its file of results, text on its page."""
 
 from __future__ import annotations
 
@@ -19,3 +19,9 @@ def record(name: str, rows: Sequence[dict[str, Any]]) -> None:
         if not begun:
             writer.writeheader()
         writer.writerows(rows)
+
+
+def written(page: Path, mark: str, text: str) -> None:
+    """Put a text between the two marks of a page."""
+    before, _, after = page.read_text(encoding="utf-8").split(mark)
+    page.write_text(f"{before}{mark}\n\n{text}\n\n{mark}{after}", encoding="utf-8")

@@ -3,7 +3,8 @@
 Brightness is the mean linear luminance of what is covered. The plainest client draws (no
 anisotropic filtering); as many samples of each pixel are taken as make a picture of 800 pixels,
 since four of a plant 25 pixels high are noise: what is measured is the mean of pictures moved by
-parts of a pixel.
+parts of a pixel, and single pictures of coarse levels vary by per cents around it. The plant itself
+is seen from where the first level is; how far away it is changes its brightness by half a per cent.
 """
 
 from __future__ import annotations

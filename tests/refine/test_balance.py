@@ -41,7 +41,7 @@ from vegtool.refine.brightness import (
 )
 from vegtool.refine.color import LEAST_GAIN, MOST_GAIN, luminances, scaled
 from vegtool.refine.drawn import drawn
-from vegtool.refine.retouch import turned
+from vegtool.refine.retouch import rotated
 from vegtool.seeding import generator
 
 FEW = 24
@@ -92,7 +92,7 @@ def test_turning_columns_are_the_derivative_by_turns(element: int, axis: int) ->
     _, turning = _matrices(samples, wanted, np.ones(3, dtype=bool))
     step = 1e-6 * np.eye(3)[axis] * (samples.element == element)[:, None]
     up, down = (
-        _brightness(replace(samples, normal=turned(samples.normal, s)), wanted)
+        _brightness(replace(samples, normal=rotated(samples.normal, s)), wanted)
         for s in (step, -step)
     )
     expected = ((up - down) / 2e-6 / wanted.values).T.ravel()

@@ -18,8 +18,8 @@ from vegtool.refine.retouch import (
     elements_of,
     normal_bytes,
     retouched,
+    rotated,
     rotation,
-    turned,
 )
 from vegtool.seeding import generator
 
@@ -194,8 +194,8 @@ def test_vectors_turn_as_others_turn_them() -> None:
     vectors, axes = random.normal(size=(100, 3)), random.normal(size=(100, 3))
     axes[0] = 0
     expected = Rotation.from_rotvec(axes).apply(vectors)
-    np.testing.assert_allclose(turned(vectors, axes), expected, atol=1e-12)
-    np.testing.assert_array_equal(turned(vectors, axes)[0], vectors[0])
+    np.testing.assert_allclose(rotated(vectors, axes), expected, atol=1e-12)
+    np.testing.assert_array_equal(rotated(vectors, axes)[0], vectors[0])
     for axis in axes[:5]:
         np.testing.assert_allclose(
             rotation(axis), Rotation.from_rotvec(axis).as_matrix(), atol=1e-12

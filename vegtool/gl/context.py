@@ -7,6 +7,7 @@ macOS (4.1). On Linux the context comes from EGL and needs neither a display nor
 from __future__ import annotations
 
 import shutil
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -30,12 +31,12 @@ LINUX_PACKAGES = (
 )
 
 
-class OnGpu:
+class OnGpu(ABC):
     """What holds something on the GPU: a context manager, leaving which releases it."""
 
+    @abstractmethod
     def release(self) -> None:
         """Free everything on the GPU."""
-        raise NotImplementedError
 
     def __enter__(self) -> Self:
         return self

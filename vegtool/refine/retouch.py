@@ -84,7 +84,7 @@ def _mesh(mesh: Plant, gain: FloatArray, turn: FloatArray) -> Plant:
         return np.asarray(np.bincount(corners, np.repeat(values, 3), len(times)) / times)
 
     axis = np.stack([mean(column) for column in turn.T], axis=1)
-    mesh = replace(mesh, normals=turned(mesh.normals, axis))
+    mesh = replace(mesh, normals=rotated(mesh.normals, axis))
     if mesh.colors is None:
         return mesh
     colors = mesh.colors.copy()
@@ -92,7 +92,7 @@ def _mesh(mesh: Plant, gain: FloatArray, turn: FloatArray) -> Plant:
     return replace(mesh, colors=colors)
 
 
-def turned(vectors: FloatArray, axes: FloatArray) -> FloatArray:
+def rotated(vectors: FloatArray, axes: FloatArray) -> FloatArray:
     """(n, 3) vectors turned about axes (n, 3) by as many radians as these are long.
 
     Rodrigues' formula (1840).
@@ -106,7 +106,7 @@ def turned(vectors: FloatArray, axes: FloatArray) -> FloatArray:
 
 def rotation(axis: FloatArray) -> FloatArray:
     """(3, 3) the matrix that turns columns so."""
-    return turned(np.eye(3), np.repeat(axis[None], 3, axis=0)).T
+    return rotated(np.eye(3), np.repeat(axis[None], 3, axis=0)).T
 
 
 def normal_bytes(normal: FloatArray) -> np.ndarray:
