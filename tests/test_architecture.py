@@ -25,17 +25,22 @@ MAY_IMPORT: dict[str, set[str]] = {
     "clustering": {"branches"},
     "boxes": set(),
     "lighting": set(),
-    "gl": {"lighting"},
+    "elements": {"branches"},
+    "gl": {"lighting", "elements"},
     "baking": {"gl"},
     "measure": {"gl", "lighting"},
     "baselines": {"formats", "baking", "gl", "measure"},
     "refine": {"branches", "clustering", "boxes", "gl", "baking", "lighting", "measure"},
+    "tiles": {"scene", "formats"},
     "convert": {"clustering", "boxes", "gl", "baking", "lighting", "measure", "refine"},
     "batch": {"convert", "formats", "measure"},
     "scene": {"convert", "lighting"},
+    "preview": {
+        "elements", "formats", "gl", "lighting", "measure", "scene", "tiles",
+    },
     "stability": {
         "branches", "clustering", "boxes", "gl", "lighting", "baking", "measure", "refine",
-        "convert", "growth",
+        "convert", "growth", "preview",
     },
     "report": {
         "formats", "clustering", "gl", "lighting", "measure", "baselines", "refine", "convert",
@@ -49,13 +54,13 @@ MAY_IMPORT: dict[str, set[str]] = {
     "__main__": {"cli"},
     "cli": {
         "batch", "console", "convert", "doctor", "flags", "formats", "growth", "inspect",
-        "measure", "outcomes", "report", "scene", "stability",
+        "measure", "outcomes", "preview", "report", "scene", "stability",
     },
 }  # fmt: skip
 
 HEAVY = (
     "moderngl", "trimesh", "sklearn", "scipy", "PIL", "skimage", "matplotlib",
-    "fast_simplification", "numba", "pyrender",
+    "fast_simplification", "numba", "pyrender", "pyglet", "OpenGL",
 )  # fmt: skip
 
 
@@ -102,7 +107,7 @@ def test_only_gl_imports_moderngl_and_only_formats_loads_models(path: Path) -> N
     }
     roots = {name.split(".")[0] for name in names}
     if room_of(path) != "gl":
-        assert not roots & {"moderngl", "pyrender"}
+        assert not roots & {"moderngl", "pyrender", "pyglet", "OpenGL"}
     if room_of(path) != "formats":
         assert "trimesh" not in roots
 
@@ -114,6 +119,7 @@ def test_only_gl_imports_moderngl_and_only_formats_loads_models(path: Path) -> N
         "from vegtool.cli import run; run(['--help'])",
         "from vegtool.cli import run; run(['convert', '--help'])",
         "from vegtool.cli import run; run(['report', '--help'])",
+        "from vegtool.cli import run; run(['preview', '--help'])",
         "from vegtool.cli import run; run(['sample', '--help'])",
     ],
 )

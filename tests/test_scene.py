@@ -19,7 +19,17 @@ from vegtool.formats.gltf import plant_glb
 from vegtool.formats.manifest import read_manifest
 from vegtool.growth import sample
 from vegtool.lighting.light import Sun
-from vegtool.scene import SCHEMA, Camera, SunLight, read_scene, unused, with_scene
+from vegtool.scene import (
+    SCHEMA,
+    Camera,
+    PlacementTable,
+    SpeciesTable,
+    SunLight,
+    TerrainTable,
+    read_scene,
+    unused,
+    with_scene,
+)
 
 PAGE = Path(__file__).parent.parent / "docs" / "scene.md"
 WHOLE = """\
@@ -46,6 +56,7 @@ kind = "heightmap"
 heightmap = "valley.tif"
 extent_m = [2000, 1500]
 crs = "EPSG:25832"
+origin = [565_000, 5_930_000]
 height_m = [-3, 710]
 
 [[species]]
@@ -65,6 +76,7 @@ model = "pine.glb"
 seed = 4
 spacing_m = 3
 inventory = "trees.csv"
+units = { height = "cm" }
 
 [placement.columns]
 x = "easting"
@@ -95,9 +107,13 @@ def test_a_whole_scene_is_read(tmp_path: Path) -> None:
     corners = ((0, 0), (100, 0), (100, 50.5))
     assert scene.camera == Camera("flight.csv", corners, (1.5, 40), 50, 1440, True, 2.5)
     assert scene.light == SunLight(False, Sun(270.0, 35.0))
-    assert scene.terrain["extent_m"] == [2000, 1500]
-    assert [kind["name"] for kind in scene.species] == ["ash", "pine"]
-    assert scene.placement["columns"] == {"x": "easting", "y": "northing"}
+    assert scene.terrain == TerrainTable(
+        "heightmap", "valley.tif", (2000, 1500), "EPSG:25832", (565_000, 5_930_000), (-3, 710)
+    )
+    ash = SpeciesTable("ash", "ash.glb", 0.5, (4, 18), (0, 30), (0, 600), "ash.png")
+    assert scene.species == (ash, SpeciesTable("pine", "pine.glb"))
+    columns, units = {"x": "easting", "y": "northing"}, {"height": "cm"}
+    assert scene.placement == PlacementTable(4, 3, "trees.csv", columns, units)
     assert scene.budget == {"bytes": 500_000_000, "triangles": 2_000_000, "frame_ms": 8.3}
 
 
@@ -105,12 +121,24 @@ def test_the_whole_scene_names_every_key(tmp_path: Path) -> None:
     scene = read_scene(written(tmp_path, WHOLE))
     named = {(place[0], place[-1]) for place in scene.lines}
     assert {(table, key) for table, keys in SCHEMA.items() for key in keys} <= named
-    assert {item.name for item in fields(Camera)} == set(SCHEMA["camera"])
+    for table, kind in (
+        ("camera", Camera),
+        ("light", SunLight),
+        ("terrain", TerrainTable),
+        ("species", SpeciesTable),
+        ("placement", PlacementTable),
+    ):
+        assert {item.name for item in fields(kind)} == set(SCHEMA[table])
 
 
 def test_an_empty_scene_says_nothing(tmp_path: Path) -> None:
     scene = read_scene(written(tmp_path, "# nothing yet\n"))
     assert (scene.camera, scene.light, unused(scene, ConvertOptions())) == (Camera(), None, [])
+    assert (scene.terrain, scene.species, scene.placement) == (
+        TerrainTable(),
+        (),
+        PlacementTable(),
+    )
     assert with_scene(ConvertOptions(), scene) == ConvertOptions()
 
 
@@ -233,6 +261,7 @@ def test_a_long_list_is_read_in_no_time(tmp_path: Path) -> None:
         ("[[species]]\nslope_deg = [0, 95]", "slope_deg: expected at most 90; got 95"),
         ("[placement]\ncolumns = { x = 3 }", "columns: expected names in quotes, { x ="),
         ("[placement]\nseed = -1", "seed: expected at least 0; got -1"),
+        ("[placement]\nspacing_m = 0", "spacing_m: expected more than 0; got 0"),
         (f"[budget]\nbytes = 1{'0' * 400}", "line 2: bytes: expected a whole number; got 1000"),
         ("[camera", "FILE: expected TOML; Expected ']'"),
         ("[light]\nmoves = true\nmoves = true", "FILE: expected TOML; Cannot overwrite a value"),

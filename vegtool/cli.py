@@ -23,6 +23,7 @@ from vegtool.errors import BatchError, QualityError, UsageError, VegtoolError, u
 from vegtool.flags import flags, read_config
 from vegtool.formats import ReadOptions
 from vegtool.measure.options import MeasureOptions
+from vegtool.preview.options import PreviewOptions
 from vegtool.report.options import ReportOptions
 
 app = typer.Typer(
@@ -299,6 +300,89 @@ def inspect_command(
     with console.bar("inspect") as progress:
         inspection = inspect_plant(model, read, branches, force, progress)
     console.result(inspection, inspection_text(inspection))
+
+
+@app.command("preview")
+@flags
+def preview_command(
+    *,
+    path: Annotated[
+        Path,
+        typer.Argument(
+            help="A folder of converted plants, a manifest, a plant model or a scene.",
+            parser=_path,
+        ),
+    ],
+    scene: Annotated[
+        Path | None,
+        typer.Option(
+            "--scene", help="A scene file: where plants stand.", metavar="FILE.toml", parser=_path
+        ),
+    ] = None,
+    preview: PreviewOptions,
+    read: ReadOptions,
+    camera: Annotated[
+        Path | None,
+        typer.Option("--path", help="A camera path to walk.", metavar="PATH.toml", parser=_path),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "-o",
+            "--out",
+            help="Write the walk: NAME.mp4, NAME.gif, NAME.png or a folder.",
+            metavar="FILE",
+            parser=_path,
+        ),
+    ] = None,
+    screenshot: Annotated[
+        Path | None,
+        typer.Option("--screenshot", help="Write one picture.", metavar="FILE.png", parser=_path),
+    ] = None,
+    frames: Annotated[
+        int | None,
+        typer.Option("--frames", help="Draw so many frames and say what they took.", min=1),
+    ] = None,
+    stats: Annotated[
+        Path | None,
+        typer.Option("--stats", help="Write their figures.", metavar="FILE.json", parser=_path),
+    ] = None,
+    html: Annotated[
+        Path | None,
+        typer.Option(
+            "--html",
+            help="Write a page that shows the plants in any browser.",
+            metavar="FILE.html",
+            parser=_path,
+        ),
+    ] = None,
+    force: Force = False,
+    json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = 0,
+    config: Config = None,
+) -> None:
+    """Walk through plants and landscapes: geometry near, levels of detail far.
+
+    Opens a window (h shows the keys); with --screenshot, --frames, --out or --html none.
+
+    [bold]Examples[/bold]
+
+        vegtool preview out/
+
+        vegtool preview out/ --scene scene.toml --fps 30
+
+        vegtool preview out/ --scene scene.toml --path walk.toml --out walk.mp4
+
+        vegtool preview out/ --html page.html
+    """
+    from vegtool.preview.command import Wanted, run_preview
+
+    console = Console(-1 if quiet else verbose, json)
+    wanted = Wanted(path, scene, camera, out, screenshot, frames, stats, html, force)
+    with console.bar("preview") as progress:
+        result = run_preview(wanted, preview, read, progress, console.say)
+    console.result(result.facts, result.text)
 
 
 @app.command("doctor")

@@ -103,8 +103,9 @@ class ConvertOptions:
     refine: str = option(
         "full",
         "full: planes by image error, wood as a small mesh, coverage and colour as measured; "
+        "opaque: the same, with triangles in place of pictures, for viewers that can fill little; "
         "none: the paper's billboards.",
-        choices=("full", "none"),
+        choices=("full", "opaque", "none"),
     )
     orientation_weight: float = option(
         ClusterOptions().orientation_weight,
@@ -348,7 +349,8 @@ def level_maker(
     def make(count: int, near_m: float, progress: Progress) -> Level:
         most = TRIANGLES_PER_BILLBOARD * count
         balance = not casts and not options.crown_normals  # which it would bend back
-        wanted = Wanted(most, near_m, options.max_texture, options.seed, balance)
+        textured = options.refine != "opaque"
+        wanted = Wanted(most, near_m, options.max_texture, options.seed, balance, textured)
         return refined_level(source, wanted, progress)
 
     return make

@@ -83,6 +83,7 @@ def _panel(group: str) -> str:
     titles = {
         "ConvertOptions": "Levels of detail",
         "MeasureOptions": "Measuring",
+        "PreviewOptions": "What is shown",
         "ReportOptions": "What is compared",
         "ReadOptions": "Reading",
     }

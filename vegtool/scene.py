@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from math import hypot
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from vegtool.convert import ConvertOptions
 from vegtool.errors import UsageError
@@ -21,6 +21,7 @@ from vegtool.options import default_of, flag_of
 
 Place = tuple[str | int, ...]
 """Where a value stands in a file: keys, and numbers in lists."""
+Pair = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,7 @@ SCHEMA: dict[str, dict[str, Key]] = {
         "heightmap": Key("text", "file with heights"),
         "extent_m": Key("pair", "size along x and z", above=0),
         "crs": Key("text", "coordinate reference system, such as EPSG:25832"),
+        "origin": Key("pair", "where the middle of the extent is on the map: east and north"),
         "height_m": Key("range", "lowest and highest ground"),
     },
     "species": {
@@ -74,9 +76,10 @@ SCHEMA: dict[str, dict[str, Key]] = {
     },
     "placement": {
         "seed": _like("seed", "integer", "seed of every random choice"),
-        "spacing_m": Key("number", "least distance between plants", least=0),
+        "spacing_m": Key("number", "least distance between plants", above=0),
         "inventory": Key("text", "file with a row per plant, in place of a spacing"),
         "columns": Key("words", "which of its columns holds what"),
+        "units": Key("words", "in what units, where that is not metres or degrees"),
     },
     "budget": {
         "bytes": Key("integer", "of all files", least=1),
@@ -109,8 +112,12 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= MOST
 
 
+def _are_numbers(value: Any, *counts: int) -> bool:
+    return isinstance(value, list) and len(value) in counts and all(map(_is_number, value))
+
+
 def _is_pair(value: Any) -> bool:
-    return isinstance(value, list) and len(value) == 2 and all(map(_is_number, value))
+    return _are_numbers(value, 2)
 
 
 def _has_area(points: list[list[float]]) -> bool:
@@ -130,6 +137,8 @@ KINDS: dict[str, tuple[str, Callable[[Any], bool]]] = {
     "number": ("a number", _is_number),
     "text": ("text in quotes", lambda v: isinstance(v, str) and bool(v)),
     "pair": ("two numbers, [a, b]", _is_pair),
+    "point": ("three numbers, [x, y, z]", lambda v: _are_numbers(v, 3)),
+    "place": ("[x, y, z], or [x, z] above the ground", lambda v: _are_numbers(v, 2, 3)),
     "range": ("two numbers, [low, high]", lambda v: _is_pair(v) and v[0] <= v[1]),
     "points": (
         "three points at least that are not on one line, [[x, z], [x, z], [x, z]]",
@@ -148,8 +157,8 @@ class Camera:
     """From where a scene is seen; None and () where the file does not say."""
 
     path: str | None = None
-    polygon: tuple[tuple[float, float], ...] = ()
-    height_m: tuple[float, float] | None = None
+    polygon: tuple[Pair, ...] = ()
+    height_m: Pair | None = None
     fov_y_deg: float | None = None
     image_height_px: int | None = None
     above: bool | None = None
@@ -166,21 +175,57 @@ class SunLight:
 
 
 @dataclass(frozen=True)
+class TerrainTable:
+    """The ground that plants stand on; None where the file does not say."""
+
+    kind: Literal["none", "plane", "heightmap"] | None = None
+    heightmap: str | None = None
+    extent_m: Pair | None = None
+    crs: str | None = None
+    origin: Pair | None = None
+    height_m: Pair | None = None
+
+
+@dataclass(frozen=True)
+class SpeciesTable:
+    """One kind of plant, and where it grows; None where the file does not say."""
+
+    name: str | None = None
+    model: str | None = None
+    share: float | None = None
+    height_m: Pair | None = None
+    slope_deg: Pair | None = None
+    elevation_m: Pair | None = None
+    density: str | None = None
+
+
+@dataclass(frozen=True)
+class PlacementTable:
+    """How plants are placed; None and {} where the file does not say."""
+
+    seed: int | None = None
+    spacing_m: float | None = None
+    inventory: str | None = None
+    columns: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class Scene:
-    """A scene file. terrain, species, placement, budget: as they stand there; lines: where."""
+    """A scene file. budget: as it stands there; lines: where everything does."""
 
     path: Path
     camera: Camera = field(default_factory=Camera)
     light: SunLight | None = None
-    terrain: Mapping[str, Any] = field(default_factory=dict)
-    species: tuple[Mapping[str, Any], ...] = ()
-    placement: Mapping[str, Any] = field(default_factory=dict)
+    terrain: TerrainTable = field(default_factory=TerrainTable)
+    species: tuple[SpeciesTable, ...] = ()
+    placement: PlacementTable = field(default_factory=PlacementTable)
     budget: Mapping[str, Any] = field(default_factory=dict)
     lines: Mapping[Place, int] = field(default_factory=dict)
 
     def at(self, *place: str | int) -> str:
         """File and line of a value."""
-        return _at(self.path, self.lines, place)
+        return file_and_line(self.path, self.lines, place)
 
 
 def read_scene(path: Path) -> Scene:
@@ -189,27 +234,35 @@ def read_scene(path: Path) -> Scene:
     Raises UsageError, with file and line, for what cannot be read, for a table or a key that is
     not in SCHEMA, and for a value that its key may not have.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-        values = tomllib.loads(text)
-    except OSError as error:
-        raise UsageError(f"{path}: cannot read this scene ({error.strerror})") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise UsageError(f"{path}: expected TOML; {error}") from error
-    lines = _lines(text)
+    values, lines = read_toml(path, "scene")
     for name, table in values.items():
         _check_table(path, lines, name, table)
     light = values.get("light")
     return Scene(
         path,
         _camera(values.get("camera", {})),
-        None if light is None else _sun_light(light, _at(path, lines, ("light", "sun"))),
-        values.get("terrain", {}),
-        tuple(values.get("species", ())),
-        values.get("placement", {}),
+        None if light is None else _sun_light(light, file_and_line(path, lines, ("light", "sun"))),
+        TerrainTable(**_paired(values.get("terrain", {}))),
+        tuple(SpeciesTable(**_paired(table)) for table in values.get("species", ())),
+        PlacementTable(**values.get("placement", {})),
         values.get("budget", {}),
         lines,
     )
+
+
+def read_toml(path: Path, what: str) -> tuple[dict[str, Any], dict[Place, int]]:
+    """The values of a TOML file, and the line of each; `what` it is, for messages.
+
+    Raises UsageError for what cannot be read.
+    """
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+        values = tomllib.loads(text)
+    except OSError as error:
+        raise UsageError(f"{path}: cannot read this {what} ({error.strerror})") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise UsageError(f"{path}: expected TOML; {error}") from error
+    return values, _lines(text)
 
 
 def with_scene(options: ConvertOptions, scene: Scene) -> ConvertOptions:
@@ -279,10 +332,13 @@ def _agreed_sun(options: ConvertOptions, scene: Scene) -> str | None:
 
 
 def _camera(table: dict[str, Any]) -> Camera:
-    pairs = {"polygon": tuple((x, z) for x, z in table.get("polygon", ()))}
-    if "height_m" in table:
-        pairs["height_m"] = tuple(table["height_m"])
-    return Camera(**{**table, **pairs})
+    corners = tuple((x, z) for x, z in table.get("polygon", ()))
+    return Camera(**{**_paired(table), "polygon": corners})
+
+
+def _paired(table: dict[str, Any]) -> dict[str, Any]:
+    """A table whose lists are tuples, as dataclasses hold them."""
+    return {key: tuple(v) if isinstance(v, list) else v for key, v in table.items()}
 
 
 def _sun_light(table: dict[str, Any], at: str) -> SunLight:
@@ -294,20 +350,22 @@ def _sun_light(table: dict[str, Any], at: str) -> SunLight:
 def _check_table(path: Path, lines: Mapping[Place, int], name: str, table: Any) -> None:
     if name not in SCHEMA:
         what = f"no table is called {name!r}; known: {', '.join(map(_header, SCHEMA))}"
-        raise UsageError(f"{_at(path, lines, (name,))}: {what}")
+        raise UsageError(f"{file_and_line(path, lines, (name,))}: {what}")
     listed = name in LISTED
     if not isinstance(table, list if listed else dict):
-        raise UsageError(f"{_at(path, lines, (name,))}: expected a table {_header(name)}")
+        raise UsageError(f"{file_and_line(path, lines, (name,))}: expected a table {_header(name)}")
     for place, part in _parts(name, table):
         if not isinstance(part, dict):
-            raise UsageError(f"{_at(path, lines, place)}: expected a table {_header(name)}")
+            raise UsageError(
+                f"{file_and_line(path, lines, place)}: expected a table {_header(name)}"
+            )
         for key, value in part.items():
-            _check(_at(path, lines, (*place, key)), name, key, value)
+            _check(file_and_line(path, lines, (*place, key)), name, key, value)
         if name in NEEDED and NEEDED[name] not in part:
-            raise UsageError(f"{_at(path, lines, place)}: {_lacks(name, NEEDED[name])}")
+            raise UsageError(f"{file_and_line(path, lines, place)}: {_lacks(name, NEEDED[name])}")
         for (table, key, value), needed in NEEDED_BY.items():
             if table == name and part.get(key) == value and needed not in part:
-                at = _at(path, lines, (*place, key))
+                at = file_and_line(path, lines, (*place, key))
                 raise UsageError(f'{at}: {key} is "{value}": {_lacks(name, needed)}')
 
 
@@ -334,7 +392,11 @@ def _check(at: str, table: str, key: str, value: Any) -> None:
     if key not in known:
         what = f"no key of {_header(table)} is called {key!r}"
         raise UsageError(f"{at}: {what}; known: {', '.join(known)}")
-    rule = known[key]
+    check_value(at, key, known[key], value)
+
+
+def check_value(at: str, key: str, rule: Key, value: Any) -> None:
+    """Raise UsageError, which begins with `at`, where a key may not have its value."""
     expected, fits = KINDS[rule.kind]
     if not fits(value):
         raise UsageError(f"{at}: {key}: expected {expected}; got {_toml(value)}")
@@ -358,7 +420,7 @@ def _toml(value: Any) -> str:
     return f"{value!r:.60}"
 
 
-def _at(path: Path, lines: Mapping[Place, int], place: Place) -> str:
+def file_and_line(path: Path, lines: Mapping[Place, int], place: Place) -> str:
     """File and line of a value, or of what it stands in."""
     while place and place not in lines:
         place = place[:-1]

@@ -98,7 +98,7 @@ def draw_tile(
     begin(drawn, size)
     for each in buffers:
         render(each, shot, light, supersample, anisotropy, shadows)
-    return _resolved(ctx, drawn, (shot.width, shot.height), supersample, samples)
+    return resolved(ctx, drawn, (shot.width, shot.height), supersample, samples)
 
 
 def begin(drawn: Target, size: tuple[int, int]) -> None:
@@ -205,9 +205,11 @@ def pixels_per_metre(shot: Shot) -> float:
 _screens: WeakKeyDictionary[moderngl.Program, moderngl.VertexArray] = WeakKeyDictionary()
 
 
-def _resolved(
+def resolved(
     ctx: moderngl.Context, drawn: Target, size: tuple[int, int], supersample: int, samples: int
 ) -> Target:
+    """What was drawn into the lower left corner of a target, as `size` pixels, the means of their
+    samples in linear light: top row first."""
     averaged = pixel_target(ctx, size)
     averaged.frame.viewport = (0, 0, *size)
     averaged.frame.use()

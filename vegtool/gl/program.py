@@ -11,7 +11,8 @@ from weakref import WeakKeyDictionary
 
 import moderngl
 
-HEADER = "#version 330 core\n"
+HEADER = "#version 330 core\n#extension GL_ARB_sample_shading : enable\n"
+"""The extension lets a shader say which samples it covers; all that is not told so needs none."""
 _programs: WeakKeyDictionary[moderngl.Context, dict[tuple[str, ...], moderngl.Program]] = (
     WeakKeyDictionary()
 )
@@ -25,7 +26,11 @@ def program(ctx: moderngl.Context, vertex: str, fragment: str, *defines: str) ->
     made = _programs.setdefault(ctx, {})
     key = (vertex, fragment, *defines)
     if key not in made:
-        head = HEADER + "".join(f"#define {name}\n" for name in defines)
+        head = (
+            HEADER
+            + "#extension GL_ARB_sample_shading : enable\n"
+            + "".join(f"#define {name}\n" for name in defines)
+        )
         made[key] = ctx.program(
             vertex_shader=head + source(vertex), fragment_shader=head + source(fragment)
         )

@@ -61,22 +61,28 @@ class PlantBuffers(OnGpu):
     face_order: (f,) the plant's faces in the order of the index buffer, material by material.
     groups: one per material that has faces.
     mipmaps: give textures mips, as a client does, and leave the colour under alpha 0 as it is.
+    keep_coverage: mips of cut-out materials that show as much, which no client makes.
     """
 
     def __init__(
-        self, plant: Plant, *, mipmaps: bool = False, ctx: moderngl.Context | None = None
+        self,
+        plant: Plant,
+        *,
+        mipmaps: bool = False,
+        keep_coverage: bool = False,
+        ctx: moderngl.Context | None = None,
     ) -> None:
         self.plant = plant
         self.ctx = ctx or context()
         self.origin: FloatArray = plant.center
         self.scale: float = plant.radius or 1.0
         self.face_order = np.argsort(plant.face_material, kind="stable").astype(np.int32)
-        self.mipmaps = mipmaps
+        self.mipmaps, self.keep_coverage = mipmaps, keep_coverage
         self._filter = (
             moderngl.LINEAR_MIPMAP_LINEAR if mipmaps else moderngl.LINEAR,
             moderngl.LINEAR,
         )
-        self._textures: dict[tuple[int, bool, bool], moderngl.Texture] = {}
+        self._textures: dict[tuple[int, bool, float | None], moderngl.Texture] = {}
         self._owned: list[moderngl.Buffer | moderngl.Texture | moderngl.VertexArray] = []
         self._arrays: dict[moderngl.Program, moderngl.VertexArray] = {}
         self.groups = self._material_groups()
@@ -88,6 +94,13 @@ class PlantBuffers(OnGpu):
         self._owned.clear()
         self._arrays.clear()
         self._textures.clear()
+
+    @property
+    def texture_bytes(self) -> int:
+        """Of all textures, their mips counted."""
+        third = 3 if self.mipmaps else 0
+        sizes = (4 * t.width * t.height for t in self._textures.values())
+        return sum(size + (size // third if third else 0) for size in sizes)
 
     @cached_property
     def indices(self) -> moderngl.Buffer:
@@ -195,7 +208,7 @@ class PlantBuffers(OnGpu):
                 material,
                 int(first),
                 int(count),
-                self._texture(material.color_texture, True, material.alpha_mode == "mask"),
+                self._texture(material.color_texture, True, _cutoff(material)),
                 self._plain(material.normal_texture),
                 self._plain(material.light_texture),
             )
@@ -206,13 +219,13 @@ class PlantBuffers(OnGpu):
         )
 
     def _plain(self, image: Texture | None) -> moderngl.Texture | None:
-        return None if image is None else self._texture(image, False, False)
+        return None if image is None else self._texture(image, False, None)
 
-    def _texture(self, image: Texture | None, srgb: bool, cut_out: bool) -> moderngl.Texture:
-        key = (id(image), srgb, cut_out)
+    def _texture(self, image: Texture | None, srgb: bool, cutoff: float | None) -> moderngl.Texture:
+        key = (id(image), srgb, cutoff)
         if key not in self._textures:
             pixels = np.full((1, 1, 4), 255, np.uint8) if image is None else image.pixels
-            if cut_out and not self.mipmaps:
+            if cutoff is not None and not self.mipmaps:
                 pixels = bled_under_alpha(pixels)
             height, width = pixels.shape[:2]
             limit = describe(self.ctx).max_texture
@@ -227,7 +240,8 @@ class PlantBuffers(OnGpu):
             )
             if self.mipmaps:
                 texture.build_mipmaps()  # allocates them
-                for level, smaller in enumerate(mip_levels(pixels, srgb), start=1):
+                kept = cutoff if self.keep_coverage else None
+                for level, smaller in enumerate(mip_levels(pixels, srgb, kept), start=1):
                     texture.write(np.ascontiguousarray(smaller), level=level)
             texture.filter = self._filter
             self._textures[key] = self._own(texture)
@@ -236,6 +250,13 @@ class PlantBuffers(OnGpu):
     def _own(self, made: Owned) -> Owned:
         self._owned.append(made)
         return made
+
+
+def _cutoff(material: Material) -> float | None:
+    """The least alpha of the texture that is shown; None for opaque materials."""
+    if material.alpha_mode != "mask":
+        return None
+    return float(material.alpha_cutoff / max(material.base_color[3], 1e-6))
 
 
 def vertex_data(plant: Plant, origin: FloatArray, scale: float) -> npt.NDArray[np.float32]:

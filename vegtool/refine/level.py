@@ -110,13 +110,14 @@ class Source:
 class Wanted:
     """A level to be: at most so many triangles, for distances from `near_m` metres on, and textures
     of at most `max_texture` texels a side. balance: whether its light is to be the plant's from all
-    around."""
+    around. textured: leaves may be pictures; else they are triangles whatever their size."""
 
     triangles: int
     near_m: float
     max_texture: int = BakeOptions().max_texture
     seed: int = 0
     balance: bool = True
+    textured: bool = True
 
     @property
     def far_m(self) -> float:
@@ -157,11 +158,12 @@ def refined_level(source: Source, wanted: Wanted, progress: Progress = silent) -
         wood = wood_of(source, wanted, pixel_m)
     left = wanted.triangles - (0 if wood is None else len(wood.faces))
     progress("planes", 0.1)
-    made = on_planes(source, wanted, wood, left, seconds, progress)
-    if leaf_pixels(source, left, pixel_m) <= SMALL:
+    made = on_planes(source, wanted, wood, left, seconds, progress) if wanted.textured else None
+    if made is None or leaf_pixels(source, left, pixel_m) <= SMALL:
         progress("foliage", 0.8)
         with timed(seconds, "foliage"):
-            made = better(source, wanted, made, as_triangles(source, wanted, wood, left))
+            plain = as_triangles(source, wanted, wood, left)
+            made = plain if made is None else better(source, wanted, made, plain)
     level = replace(made.level, near_distance_m=wanted.near_m)
     if wanted.balance and not level.unlit:
         progress("balance", 0.9)

@@ -9,12 +9,20 @@ uniform float alpha_cutoff;  // 0 for opaque materials: nothing is below it
 #define filtered texture
 #endif
 
+#ifdef SOFT_EDGES
+#include "soft_edges.glsl"
+#endif
+
 vec3 surface_color(vec2 uv, vec4 vertex_color) {
     vec4 color = base_color * vertex_color;
 #ifndef NO_COLOR_MAP
     color *= filtered(color_map, uv);
 #endif
+#ifdef SOFT_EDGES
+    cover(color.a, alpha_cutoff);
+#else
     if (color.a < alpha_cutoff) discard;
+#endif
     return color.rgb;
 }
 

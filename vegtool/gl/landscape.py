@@ -1,0 +1,239 @@
+"""A landscape drawn live: ground and plants, each kind of plant many times at once.
+
+What is drawn is decided elsewhere and comes as rows of INSTANCE and batches of them; nothing here
+knows of levels, tiles or distances.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+
+from vegtool.arrays import ByteArray, FloatArray, IntArray, Picture
+from vegtool.elements import Elements
+from vegtool.gl.context import OnGpu, check, context, framebuffer_kept
+from vegtool.gl.draw import ANISOTROPY, Shot, begin, resolved, set_footprint, set_light, tiles
+from vegtool.gl.instances import INSTANCE, NOISE, InstancedPlant, View, instance_program
+from vegtool.gl.program import program
+from vegtool.gl.targets import drawing_target
+from vegtool.lighting.light import Light
+from vegtool.plant import Plant
+
+GROUND_COLOR = (0.105, 0.125, 0.055)
+"""Linear: grown-over soil."""
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Instances of one plant that are drawn by one call for each of its materials.
+
+    plant: index among those of the landscape. first, count: rows. share: the most that any of them
+    keeps of its elements. fading: whether texels are hidden of some.
+    """
+
+    plant: int
+    first: int
+    count: int
+    share: float
+    fading: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """What is drawn of a landscape from one eye. rows: (n,) INSTANCE, relative to the eye; batches
+    nearest first, which hides most at least cost."""
+
+    rows: np.ndarray
+    batches: tuple[Batch, ...]
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """What a frame was made of, ground included: calls, triangles, and samples that passed the
+    depth test."""
+
+    draws: int
+    triangles: int
+    samples: int
+
+
+@dataclass(frozen=True, eq=False)
+class GroundMesh:
+    """positions: (v, 3) float64 metres relative to origin, (3,). normals: (v, 3). faces: (f, 3)."""
+
+    origin: FloatArray
+    positions: FloatArray
+    normals: FloatArray
+    faces: IntArray
+
+
+class Landscape(OnGpu):
+    """Plants and ground on the GPU. A context manager: leaving releases.
+
+    noise: by mip level, (s, s) uint8, what reveals texels (preview/reveal.py). pixels_fade: fades
+    go by pixels of the screen, not by texels.
+    """
+
+    def __init__(
+        self,
+        noise: Sequence[ByteArray],
+        ground: GroundMesh | None = None,
+        *,
+        pixels_fade: bool = False,
+        ctx: moderngl.Context | None = None,
+    ) -> None:
+        self.ctx = ctx or context()
+        self.plants: list[InstancedPlant] = []
+        self.fading = "pixels" if pixels_fade else "texels"
+        self._noise = _noise_texture(self.ctx, noise)
+        self._rows = self.ctx.buffer(reserve=INSTANCE.itemsize * 1024, dynamic=True)
+        self._samples = self.ctx.query(samples=True)
+        self._ground = None if ground is None else _Ground(self.ctx, ground)
+
+    def add(self, plant: Plant, elements: Elements, *, mipmaps: bool = True) -> int:
+        """Upload one more; returns its index. mipmaps: none for what is supersampled."""
+        self.plants.append(InstancedPlant(plant, elements, mipmaps=mipmaps, ctx=self.ctx))
+        return len(self.plants) - 1
+
+    def release(self) -> None:
+        """Free everything on the GPU."""
+        for plant in self.plants:
+            plant.release()
+        self.plants.clear()
+        self._noise.release()
+        self._rows.release()
+        if self._ground is not None:
+            self._ground.release()
+
+    @property
+    def texture_bytes(self) -> int:
+        """Of all plants' textures, mips counted."""
+        return sum(plant.buffers.texture_bytes for plant in self.plants)
+
+    def draw(
+        self,
+        frame: Frame,
+        shot: Shot,
+        light: Light,
+        view: View = "lit",
+        *,
+        wireframe: bool = False,
+        ground: bool = True,
+    ) -> Drawn:
+        """Draw into the framebuffer in use, which is cleared and has depth.
+
+        shot: its target is the eye, relative to which the rows are.
+        """
+        self._write(frame.rows)
+        if view == "overdraw":
+            self.ctx.enable_only(moderngl.BLEND)
+            self.ctx.blend_func = moderngl.ONE, moderngl.ONE
+        self.ctx.wireframe = wireframe
+        with self._samples:
+            draws, triangles = self._draw_plants(frame, shot, light, view)
+            if ground and self._ground is not None:  # last: most of it is hidden
+                triangles += self._ground.draw(shot, light)
+                draws += 1
+        self.ctx.wireframe = False
+        self.ctx.enable_only(moderngl.DEPTH_TEST)
+        return Drawn(draws, triangles, self._samples.samples)
+
+    def _draw_plants(self, frame: Frame, shot: Shot, light: Light, view: View) -> tuple[int, int]:
+        self._noise.use(NOISE)
+        matrix = tuple(shot.view_projection.T.ravel())
+        draws = triangles = 0
+        told: set[moderngl.Program] = set()
+        for batch in frame.batches:
+            plant = self.plants[batch.plant]
+            fading = self.fading if batch.fading else ""
+            for group in plant.buffers.groups:
+                shader = instance_program(plant.buffers, group, fading, ANISOTROPY, view)
+                if shader not in told:
+                    told.add(shader)
+                    shader["view_projection"] = matrix
+                    set_footprint(shader, 1.0)
+                    set_light(shader, plant.buffers, light)
+                    if "noise" in shader:
+                        shader["noise"] = NOISE
+                plant.buffers.use(group, shader)
+                drawn = plant.draw(group, shader, self._rows, batch.first, batch.count, batch.share)
+                draws += bool(drawn)
+                triangles += drawn
+        return draws, triangles
+
+    def _write(self, rows: np.ndarray) -> None:
+        size = max(rows.nbytes, 1)
+        if self._rows.size < size:
+            self._rows.release()
+            self._rows = self.ctx.buffer(reserve=size * 3 // 2, dynamic=True)
+        self._rows.orphan(self._rows.size)
+        self._rows.write(np.ascontiguousarray(rows))
+
+
+def picture(
+    landscape: Landscape,
+    frame: Frame,
+    shot: Shot,
+    light: Light,
+    supersample: int = 1,
+    samples: int = 0,
+    *,
+    ground: bool = True,
+) -> Picture:
+    """A frame as light and coverage, as `gl.draw.draw` gives them of one plant."""
+    ctx = landscape.ctx
+    whole = np.empty((shot.height, shot.width, 4), np.float32)
+    with framebuffer_kept(ctx):
+        for x, y, part in tiles(ctx, shot, supersample):
+            size = supersample * part.width, supersample * part.height
+            drawn = drawing_target(ctx, size, samples)
+            begin(drawn, size)
+            landscape.draw(frame, part, light, ground=ground)
+            pixels = resolved(ctx, drawn, (part.width, part.height), supersample, samples)
+            data = pixels.frame.read((0, 0, part.width, part.height), components=4, dtype="f4")
+            found = np.frombuffer(data, np.float32).reshape(part.height, part.width, 4)
+            whole[y : y + part.height, x : x + part.width] = found
+        check(ctx)
+    return whole
+
+
+class _Ground:
+    """What plants stand on, in one colour."""
+
+    def __init__(self, ctx: moderngl.Context, mesh: GroundMesh) -> None:
+        self.ctx, self.origin, self.count = ctx, mesh.origin, len(mesh.faces)
+        data = np.concatenate([mesh.positions, mesh.normals], axis=1).astype(np.float32)
+        self._vertices = ctx.buffer(np.ascontiguousarray(data))
+        self._indices = ctx.buffer(np.ascontiguousarray(mesh.faces, np.uint32))
+        self._program = program(ctx, "ground.vert", "ground.frag")
+        content = [(self._vertices, "3f 3f", "in_position", "in_normal")]
+        self._array = ctx.vertex_array(self._program, content, self._indices)
+
+    def draw(self, shot: Shot, light: Light) -> int:
+        place = np.eye(4)
+        place[:3, 3] = self.origin - shot.target
+        self._program["view_projection"] = tuple((shot.view_projection @ place).T.ravel())
+        self._program["color"] = GROUND_COLOR
+        values = {"sun_direction": tuple(light.unit), "sun": light.sun}
+        for name, value in {**values, "sky": (light.sky_above, light.sky_below)}.items():
+            self._program[name] = value
+        self._array.render()
+        return self.count
+
+    def release(self) -> None:
+        for made in (self._array, self._vertices, self._indices):
+            made.release()
+
+
+def _noise_texture(ctx: moderngl.Context, noise: Sequence[ByteArray]) -> moderngl.Texture:
+    height, width = noise[0].shape
+    texture = ctx.texture((width, height), 1, np.ascontiguousarray(noise[0]), alignment=1)
+    texture.build_mipmaps(0, len(noise) - 1)
+    for level, smaller in enumerate(noise[1:], start=1):
+        texture.write(np.ascontiguousarray(smaller), level=level, alignment=1)
+    # no mean of two levels: its values are spread otherwise
+    texture.filter = (moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR)
+    return texture

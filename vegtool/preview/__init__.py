@@ -1,0 +1,1 @@
+"""Plants and scenes as they are walked through: eyes, controls, paths, frames and films."""

@@ -1,0 +1,292 @@
+"""What is drawn of a landscape from one eye: which plants, which of their levels, how much of each.
+
+Colditz, Coconu, Deussen, Hege: Real-time rendering of complex photorealistic landscapes using
+hybrid level-of-detail approaches (2005), section 4. Near, a plant is its full geometry; far, its
+billboards; between, geometry is reduced as distance grows while billboards appear. The same holds
+for later levels among themselves. Cook, Halstead, Planck, Ryu (2007): of the geometry that is left,
+what remains is enlarged.
+
+Tiles are culled first and plants second, both in arrays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vegtool.arrays import FloatArray, IntArray
+from vegtool.elements import Elements
+from vegtool.gl.instances import INSTANCE, WHOLE
+from vegtool.gl.landscape import Batch, Frame
+from vegtool.preview.library import Species
+from vegtool.preview.options import FadeMode
+from vegtool.preview.reveal import threshold_of
+from vegtool.preview.stock import STOCK, Stock
+
+GROWTH = 0.4
+"""Lengths of elements grow with this power of how many fewer there are (docs/methods/baselines.md:
+0.5 keeps the area, of which more is seen as there is less overlap)."""
+NEAR_SPARE = 2.0
+"""Of the original where its first level takes over: triangles times those of the level. Leaves that
+were left out at random serve worse than triangles that were chosen."""
+LEAST_TRIANGLES = 4.0
+"""Of a plant, before plants of its kind are left out."""
+WIDEST = 3.0
+"""Factor of the width of plants that stand for others."""
+APPEARING = 0.15
+"""Of the distance at which a plant vanishes: along it, its width grows from nothing."""
+SHARES = 2.0**0.5
+"""Ratio of the shares of elements that are drawn by one call."""
+OVERLAP = 0.85
+"""Two levels that fade into each other cover some places both: each shows its share to this power,
+which is more than its share."""
+NO_LEVEL = 255
+"""Of a plant that was not drawn yet."""
+PIXELS_A_TRIANGLE = 2.0
+"""Of a model without levels: its geometry is whole where triangles are that large."""
+
+
+Correction = tuple[FloatArray, FloatArray]
+"""(k,) logarithms of distances, ascending, and (k,) factors there."""
+
+
+@dataclass(frozen=True, eq=False)
+class Kinds:
+    """Levels of all species in one picture's terms; s species, l levels at most.
+
+    switch_m: (s, l) metres at which each level may be used, of scale 1 and detail 1; infinite where
+    there is none. fade: (s, l). model: (s, l) int32, index in the landscape. count: (s,) levels.
+    triangles: (s, l). opaque: (s, l) bool, fades by elements; else by texels. center: (s,) metres
+    above the foot, and radius: (s,), of what a plant fills. whole_m: (s,) metres, up to which the
+    original is whole. coarse_m: (s,) metres, up to which its last level is. thinned_m: (s,), up to
+    which all plants are drawn. corrections: for each kind, (k,) logarithms of distances of plants
+    of scale 1 at detail 1, ascending, and (k,) factors of lengths there; see calibrate.py.
+    """
+
+    switch_m: FloatArray
+    fade: FloatArray
+    model: IntArray
+    count: IntArray
+    opaque: np.ndarray
+    center: FloatArray
+    radius: FloatArray
+    whole_m: FloatArray
+    coarse_m: FloatArray
+    thinned_m: FloatArray
+    corrections: tuple[Correction, ...] = ()
+
+    def lengths(self, kind: np.ndarray, away: np.ndarray) -> np.ndarray:
+        """(n,) factor of the lengths of elements of plants of a kind that far away."""
+        result = np.ones(len(kind), np.float32)
+        for index, (at, factor) in enumerate(self.corrections):
+            here = np.flatnonzero(kind == index)
+            result[here] = np.interp(np.log(away[here]), at, factor, left=1.0)
+        return result
+
+
+def kinds_of(
+    species: Sequence[Species],
+    elements: Sequence[Sequence[Elements]],
+    model: Sequence[Sequence[int]],
+    focal_px: float,
+) -> Kinds:
+    """The species for pictures in which a metre at a distance of one is `focal_px` pixels.
+
+    elements, model: of each level of each species.
+    """
+    most = max(len(one.levels) for one in species)
+    shape = (len(species), most)
+    switch, fade = np.full(shape, np.inf), np.zeros(shape)
+    index, opaque = np.zeros(shape, np.int32), np.zeros(shape, bool)
+    count = np.array([len(one.levels) for one in species], np.int32)
+    center, radius = np.zeros(len(species)), np.zeros(len(species))
+    whole, coarse, thinned = (np.zeros(len(species)) for _ in range(3))
+    for i, one in enumerate(species):
+        n = len(one.levels)
+        switch[i, :n] = one.switch_m * focal_px / one.focal_px
+        fade[i, :n] = one.fade
+        index[i, :n] = model[i]
+        opaque[i, :n] = [
+            all(m.alpha_mode == "opaque" for m in level.materials) for level in one.levels
+        ]
+        low, high = one.levels[0].bounds
+        center[i] = (low[1] + high[1]) / 2
+        reach = np.abs(np.stack([low, high])).max(axis=0)
+        radius[i] = float(np.hypot(np.hypot(reach[0], reach[2]), (high[1] - low[1]) / 2))
+        faces = [len(e.faces) for e in elements[i]]
+        if n > 1:
+            whole[i] = switch[i, 1] * min((NEAR_SPARE * faces[1] / faces[0]) ** 0.5, 1.0)
+            coarse[i] = switch[i, n - 1]
+        else:
+            area = float(one.levels[0].face_areas.mean())
+            whole[i] = coarse[i] = focal_px * (area / PIXELS_A_TRIANGLE) ** 0.5
+        thinned[i] = coarse[i] * max(faces[-1] / LEAST_TRIANGLES, 1.0) ** 0.5
+    return Kinds(switch, fade, index, count, opaque, center, radius, whole, coarse, thinned)
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """Plants of several tiles that an eye sees. rows: (n,) STOCK. place: (n, 3) float32 metres from
+    the eye. distance: (n,) float32 metres, to the middle of the plant. spare: (n,) float32, times
+    that distance that the plant vanishes. index: (n,) where they are among the plants that were
+    looked at: of each tile the first `counts`, (t,)."""
+
+    rows: np.ndarray
+    place: np.ndarray
+    distance: np.ndarray
+    spare: np.ndarray
+    index: np.ndarray
+    counts: np.ndarray
+
+
+def seen(
+    stocks: Sequence[Stock],
+    near_m: FloatArray,
+    eye: FloatArray,
+    planes: FloatArray,
+    kinds: Kinds,
+    detail: float,
+) -> Seen:
+    """The plants of tiles that reach into the view and are not too far away to be drawn.
+
+    near_m: (t,) metres from the eye to the nearest point of each tile. planes: (p, 4), as of
+    Eye.planes. detail: factor of all distances.
+    """
+    counts = np.array(
+        [
+            len(stock.reach) - np.searchsorted(stock.reach[::-1], near / detail)
+            for stock, near in zip(stocks, near_m, strict=True)
+        ],
+        np.int64,
+    )
+    parts, places = [np.zeros(0, STOCK)], [np.zeros((0, 3), np.float32)]
+    for stock, count in zip(stocks, counts, strict=True):
+        parts.append(stock.rows[:count])
+        places.append(stock.rows["offset"][:count] + (stock.origin - eye).astype(np.float32))
+    rows, place = np.concatenate(parts), np.concatenate(places)
+    kind, scale = rows["species"], rows["scale"]
+    middle = place.copy()
+    middle[:, 1] += scale * kinds.center.astype(np.float32)[kind]
+    distance = np.sqrt(np.einsum("ij,ij->i", middle, middle))
+    radius = scale * kinds.radius.astype(np.float32)[kind]
+    normals, offsets = planes[:, :3].astype(np.float32), planes[:, 3].astype(np.float32)
+    inside = (middle @ normals.T + offsets).min(axis=1, initial=np.inf) > -radius
+    vanish = scale * rows["vanish"] * (detail * kinds.thinned_m).astype(np.float32)[kind]
+    keep = np.flatnonzero(inside & (distance < vanish))
+    distance = np.maximum(distance[keep], np.float32(1e-3))
+    return Seen(rows[keep], place[keep], distance, vanish[keep] / distance, keep, counts)
+
+
+@dataclass(frozen=True, eq=False)
+class Chosen:
+    """Levels to draw, m of them; a plant that fades is among them twice.
+
+    of: (m,) which of the plants, all of them first. level: (m,) of its species. model: (m,) in the
+    landscape. kept: (m,) share of its elements.
+    length: (m,) of those that are enlarged. shown: (m,) as `reveal.glsl` reads it. solid: (m,)
+    share of what has no texels that is shown where texels fade. fading: (m,) bool.
+    """
+
+    of: np.ndarray
+    level: np.ndarray
+    model: np.ndarray
+    kept: np.ndarray
+    length: np.ndarray
+    shown: np.ndarray
+    solid: np.ndarray
+    fading: np.ndarray
+
+
+def chosen(
+    found: Seen, kinds: Kinds, detail: float, mode: FadeMode, held: int | None = None,
+    before: np.ndarray | None = None,
+) -> Chosen:  # fmt: skip
+    """The levels of the plants. held: the one that all are to have, or the last before it. before:
+    (n,) uint8 the levels that they had, NO_LEVEL for none, which those that do not fade keep as
+    long as they may."""
+    kind = found.rows["species"]
+    away = (found.distance / (found.rows["scale"] * np.float32(detail))).astype(np.float32)
+    switch = kinds.switch_m.astype(np.float32)[kind]
+    fade = kinds.fade.astype(np.float32)[kind]
+    level = ((away[:, None] >= switch).sum(axis=1) - 1).astype(np.int64)
+    each = np.arange(len(kind))
+    share = np.ones(len(kind), np.float32)
+    if held is not None:
+        level = np.minimum(held, kinds.count[kind] - 1).astype(np.int64)
+    elif mode == "none":
+        if before is not None:
+            left = ((away[:, None] >= switch * (1 + fade)).sum(axis=1) - 1).astype(np.int64)
+            level = np.where(before == NO_LEVEL, level, np.clip(before, left, level))
+    else:
+        start, length = switch[each, level], fade[each, level] * switch[each, level]
+        np.divide(away - start, length, out=share, where=length > 0)
+        share = np.minimum(share, 1)
+    fades = np.flatnonzero(share < 1)
+    of = np.concatenate([each, fades])
+    at = np.concatenate([level, level[fades] - 1])
+    comes = np.concatenate([share, share[fades]])
+    leaves = np.arange(len(of)) >= len(each)
+    whole = _share_whole(kinds, kind[of], at, away[of])
+    kept = whole * WHOLE
+    enlarged = whole**-GROWTH * kinds.lengths(kind[of], away[of])
+    shown, solid = np.full(len(of), 2.0), np.ones(len(of))
+    by_elements = kinds.opaque[kind[of], at] | (at == 0)
+    fading = np.concatenate([share < 1, np.ones(len(fades), bool)])
+    if mode == "dither":
+        shown = np.where(fading, np.where(leaves, -comes - 1e-6, comes), shown)
+    else:
+        visible = np.where(leaves, 1 - comes, comes) ** OVERLAP
+        elements = fading & by_elements
+        kept[elements] *= visible[elements]
+        fading &= ~by_elements
+        shown = np.where(fading, threshold_of(visible), shown)
+        solid = np.where(fading, visible, solid)
+    model = kinds.model[kind[of], at]
+    return Chosen(of, at.astype(np.uint8), model, kept, enlarged, shown, solid, fading)
+
+
+def _share_whole(kinds: Kinds, kind: np.ndarray, level: np.ndarray, away: np.ndarray) -> np.ndarray:
+    """(m,) of a level's elements, how many are drawn that far away where nothing fades."""
+    first, last = level == 0, level == kinds.count[kind] - 1
+    until = np.where(first, kinds.whole_m[kind], np.where(last, kinds.coarse_m[kind], np.inf))
+    return np.asarray(np.minimum((until / away) ** 2, 1.0))
+
+
+def frame(found: Seen, what: Chosen, paint: np.ndarray | None = None) -> Frame:
+    """The rows and batches of what was chosen, nearest first. paint: (m, 4) uint8 in place of the
+    plants' own tints."""
+    rows = np.zeros(len(what.of), INSTANCE)
+    stock = found.rows[what.of]
+    rows["place"][:, :3] = found.place[what.of]
+    rows["place"][:, 3] = stock["scale"]
+    rows["turn"][:, :2] = stock["turn"]
+    rows["turn"][:, 2], rows["turn"][:, 3] = what.kept, what.length
+    rows["shown"][:, 0], rows["shown"][:, 2] = what.shown, what.solid
+    rows["shown"][:, 1] = _width(stock["vanish"], found.spare[what.of])
+    rows["tint"] = stock["tint"] if paint is None else paint
+    steps = np.floor(-np.log(np.clip(what.kept, 1e-6, 1)) / np.log(SHARES)).astype(np.int64)
+    key = (what.model * 64 + steps) * 2 + what.fading
+    order = np.argsort(key.astype(np.uint16), kind="stable")  # 16 bits: a radix sort
+    key, rows = key[order], rows[order]
+    if not len(rows):
+        return Frame(rows, ())
+    first = np.concatenate([[0], np.flatnonzero(np.diff(key)) + 1])
+    count = np.diff(np.concatenate([first, [len(rows)]]))
+    share = np.maximum.reduceat(what.kept[order], first)
+    near = np.minimum.reduceat(found.distance[what.of][order], first)
+    model, fading = what.model[order][first], what.fading[order][first]
+    batches = tuple(
+        Batch(int(model[i]), int(first[i]), int(count[i]), float(share[i]), bool(fading[i]))
+        for i in np.argsort(near, kind="stable")
+    )
+    return Frame(rows, batches)
+
+
+def _width(vanish: np.ndarray, spare: np.ndarray) -> np.ndarray:
+    """(m,) factor of the width of plants, for those that are left out around them, and of those
+    that are about to be. spare: as of Seen."""
+    fewer = np.minimum((spare / vanish) ** 2, 1.0)  # the share of its kind that is still drawn
+    appearing = np.clip((spare - 1) / APPEARING, 0, 1)
+    return np.asarray(np.minimum(fewer**-GROWTH, WIDEST) * appearing)

@@ -1,0 +1,237 @@
+"""A landscape to walk through: what stands where, kept as far as it is near, and drawn.
+
+Tiles are culled as boxes in arrays; only tiles in view hold their plants, and no more of those than
+were drawn lately (MOST_PLANTS), however large the landscape is.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from time import perf_counter
+
+import numpy as np
+
+from vegtool.arrays import FloatArray
+from vegtool.elements import Elements, ordered
+from vegtool.gl.context import OnGpu
+from vegtool.gl.draw import MSAA
+from vegtool.gl.instances import View
+from vegtool.gl.landscape import GroundMesh, Landscape
+from vegtool.gl.window_client import Context
+from vegtool.lighting.light import Light
+from vegtool.preview.calibrate import corrected
+from vegtool.preview.choice import (
+    NO_LEVEL,
+    Chosen,
+    Correction,
+    Kinds,
+    Seen,
+    chosen,
+    frame,
+    kinds_of,
+    seen,
+)
+from vegtool.preview.eye import Eye
+from vegtool.preview.library import Species
+from vegtool.preview.options import FadeMode
+from vegtool.preview.palette import PALETTE
+from vegtool.preview.reveal import noise
+from vegtool.preview.stock import Stock, stocked
+from vegtool.tiles.placement import Placement
+
+MOST_PLANTS = 2_000_000
+"""Plants that are kept: 90 MB."""
+IN_FULL = 1e9
+"""Detail at which every plant is its original, whole."""
+LARGEST_PLANT = 2.0
+"""Times the size of its model."""
+CALIBRATED_PX = 665.1
+"""Pixels of a metre at a distance of one metre in pictures of 1024 x 768 and 60 degrees, for which
+lengths are corrected: distances in pixels are what matters."""
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """How a frame is drawn. detail: factor of all distances. level: held for all plants, or None.
+    color: index in state.COLORS."""
+
+    light: Light = field(default_factory=Light)
+    detail: float = 1.0
+    level: int | None = None
+    color: int = 0
+    wireframe: bool = False
+
+
+@dataclass(frozen=True)
+class FrameStats:
+    """What a frame took. plants: drawn, of `total`; rows: levels drawn, fading plants twice.
+    fragments: of pixels that passed the depth test. seconds: by part."""
+
+    tiles: int
+    plants: int
+    total: int
+    rows: int
+    draws: int
+    triangles: int
+    fragments: int
+    detail: float
+    seconds: dict[str, float] = field(default_factory=dict)
+
+
+class Forest(OnGpu):
+    """Species, where they stand, and the ground, on the GPU. A context manager: leaving releases.
+
+    Making one does nothing: `load` does, a bit at a time.
+    """
+
+    def __init__(
+        self,
+        species: Sequence[Species],
+        placement: Placement,
+        ground: GroundMesh | None = None,
+        fade: FadeMode = "alpha-test",
+    ) -> None:
+        self.species, self.placement = tuple(species), placement
+        self.ground, self.fade = ground, fade
+        self.total = int(placement.tiles.count.sum())
+        self._landscape: Landscape | None = None
+        self._elements: list[list[Elements]] = []
+        self._models: list[list[int]] = []
+        self._corrections: list[Correction] = []
+        self._kinds: dict[float, Kinds] = {}
+        self._stocks: OrderedDict[int, Stock] = OrderedDict()
+        self._levels: dict[int, np.ndarray] = {}
+        self._kept = 0
+
+    def load(self, ctx: Context | None = None) -> Iterator[float]:
+        """Upload everything and compare what is drawn with the plants in full; yields the share
+        that is done."""
+        landscape = Landscape(noise(), self.ground, pixels_fade=self.fade == "dither", ctx=ctx)
+        self._landscape = landscape
+        total, done = 2 * sum(len(one.levels) for one in self.species), 0
+        for one in self.species:
+            self._elements.append([])
+            self._models.append([])
+            for level in one.levels:
+                elements = ordered(level)
+                self._elements[-1].append(elements)
+                self._models[-1].append(landscape.add(level, elements))
+                done += 1
+                yield done / total
+        plain = kinds_of(self.species, self._elements, self._models, CALIBRATED_PX)
+        for index, one in enumerate(self.species):
+            steps = corrected(
+                plain, one, index, self._elements[index][0], landscape, CALIBRATED_PX, self.fade
+            )
+            found: Correction = np.zeros(1), np.ones(1)
+            for share, found in steps:  # noqa: B007  # the last one is the whole
+                yield (done + share * len(one.levels)) / total
+            done += len(one.levels)
+            self._corrections.append((found[0] - np.log(CALIBRATED_PX), found[1]))
+
+    def release(self) -> None:
+        """Free everything on the GPU."""
+        if self._landscape is not None:
+            self._landscape.release()
+            self._landscape = None
+
+    @property
+    def texture_bytes(self) -> int:
+        """On the GPU."""
+        return 0 if self._landscape is None else self._landscape.texture_bytes
+
+    def draw(self, eye: Eye, size: tuple[int, int], look: Look = Look()) -> FrameStats:
+        """Draw into the framebuffer in use, and wait until that is done."""
+        landscape = self._landscape
+        if landscape is None:
+            raise ValueError("Forest.draw: load it first")
+        started = perf_counter()
+        found, what, tiles = self.choose(eye, size, look)
+        drawn_frame = frame(found, what, self._paint(found, what, look.color))
+        chosen_at = perf_counter()
+        view: View = "overdraw" if look.color == 3 else "painted" if look.color else "lit"
+        drawn = landscape.draw(
+            drawn_frame, eye.shot(*size), look.light, view, wireframe=look.wireframe
+        )
+        ended = perf_counter()
+        return FrameStats(
+            len(tiles),
+            len(found.rows),
+            self.total,
+            len(what.of),
+            drawn.draws,
+            drawn.triangles,
+            drawn.samples // MSAA,
+            look.detail,
+            {"choose": chosen_at - started, "draw": ended - chosen_at},
+        )
+
+    def choose(
+        self, eye: Eye, size: tuple[int, int], look: Look
+    ) -> tuple[Seen, Chosen, np.ndarray]:
+        """The plants that are seen, the levels to draw, and the tiles in which they stand."""
+        kinds = self._kinds_for(eye.pixels_per_metre(1.0, size[1]))
+        planes = eye.planes(*size)
+        tiles, near = self._tiles_seen(eye, planes, kinds)
+        stocks = [self._stock(int(tile), kinds) for tile in tiles]
+        found = seen(stocks, near, eye.position, planes, kinds, look.detail)
+        if self.fade != "none" or look.level is not None:
+            return found, chosen(found, kinds, look.detail, self.fade, look.level), tiles
+        kept = [self._levels_of(int(tile))[:n] for tile, n in zip(tiles, found.counts, strict=True)]
+        before = np.concatenate([np.zeros(0, np.uint8), *kept])
+        what = chosen(found, kinds, look.detail, self.fade, None, before[found.index])
+        before[found.index] = what.level[: len(found.rows)]
+        for part, levels in zip(np.split(before, np.cumsum(found.counts)[:-1]), kept, strict=True):
+            levels[:] = part
+        return found, what, tiles
+
+    def _paint(self, found: Seen, what: Chosen, color: int) -> np.ndarray | None:
+        if not color:
+            return None
+        which = what.level if color == 1 else found.rows["species"][what.of]
+        return np.asarray(PALETTE[which % len(PALETTE)])
+
+    def _tiles_seen(
+        self, eye: Eye, planes: FloatArray, kinds: Kinds
+    ) -> tuple[np.ndarray, FloatArray]:
+        """The tiles whose plants may be in view, nearest first, and how near they are."""
+        tiles = self.placement.tiles
+        margin = LARGEST_PLANT * float((kinds.radius + np.abs(kinds.center)).max())
+        low, high = tiles.low - eye.position - margin, tiles.high - eye.position + margin
+        near = np.linalg.norm(np.clip(0.0, low, high), axis=1)
+        middle, half = (low + high) / 2, (high - low) / 2
+        reach = middle @ planes[:, :3].T + half @ np.abs(planes[:, :3]).T + planes[:, 3]
+        index = np.flatnonzero((reach >= 0).all(axis=1))
+        index = index[np.argsort(near[index], kind="stable")]
+        return index, near[index]
+
+    def _kinds_for(self, focal_px: float) -> Kinds:
+        if focal_px not in self._kinds:
+            self._kinds.clear()
+            self._stocks.clear()
+            self._kept = 0
+            plain = kinds_of(self.species, self._elements, self._models, focal_px)
+            moved = tuple((at + np.log(focal_px), factor) for at, factor in self._corrections)
+            self._kinds[focal_px] = replace(plain, corrections=moved)
+        return self._kinds[focal_px]
+
+    def _stock(self, tile: int, kinds: Kinds) -> Stock:
+        if tile in self._stocks:
+            self._stocks.move_to_end(tile)
+            return self._stocks[tile]
+        made = stocked(self.placement.plants(tile), self.species, kinds.thinned_m)
+        self._stocks[tile] = made
+        self._kept += len(made.rows)
+        while self._kept > MOST_PLANTS and len(self._stocks) > 1:
+            old, gone = self._stocks.popitem(last=False)
+            self._levels.pop(old, None)
+            self._kept -= len(gone.rows)
+        return made
+
+    def _levels_of(self, tile: int) -> np.ndarray:
+        """(n,) uint8 the level that each plant of a tile was last drawn at."""
+        if tile not in self._levels:
+            self._levels[tile] = np.full(len(self._stocks[tile].rows), NO_LEVEL, np.uint8)
+        return self._levels[tile]

@@ -1,0 +1,15 @@
+"""Colours that are told apart, for what is coloured by number."""
+
+from __future__ import annotations
+
+import numpy as np
+
+PALETTE = np.array(
+    [
+        [230, 230, 230, 255], [204, 60, 40, 255], [222, 160, 24, 255], [60, 150, 60, 255],
+        [50, 110, 200, 255], [140, 70, 170, 255], [40, 160, 160, 255], [200, 90, 140, 255],
+        [120, 90, 50, 255], [90, 90, 110, 255],
+    ],
+    np.uint8,
+)  # fmt: skip
+"""(10, 4) tints: linear, halved, as gl.instances.INSTANCE has them."""

@@ -1,0 +1,190 @@
+"""What a window shows, and what is drawn without one: a world, and what the viewer does in it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from vegtool.gl.panels import Panels
+from vegtool.gl.window_client import Context, Drag, Event, Framebuffer, Key, Scroll
+from vegtool.measure.background import BACKGROUND
+from vegtool.preview.controls import Fly, Input, orbiting
+from vegtool.preview.eye import Eye
+from vegtool.preview.forest import IN_FULL, Forest, FrameStats, Look
+from vegtool.preview.governor import step
+from vegtool.preview.options import FadeMode
+from vegtool.preview.state import COLORS, State, help_text, moved, pressed
+from vegtool.preview.world import World
+
+MOVING = frozenset({"w", "a", "s", "d", "q", "e", "left", "right", "up", "down"})
+"""Keys that move the eye while they are held."""
+FRAMES_TOLD = 30
+"""Frames whose mean time is shown."""
+SKY = (float(BACKGROUND[0]), float(BACKGROUND[1]), float(BACKGROUND[2]))
+PANELS = ("by distance", "in full", "difference")
+
+
+class Show:
+    """A client of gl.window: draws the world as the state says, and changes the state as the user
+    says. walked: called with each frame's eye and its time while a way is recorded.
+    """
+
+    def __init__(self, world: World, state: State, fade: FadeMode = "alpha-test") -> None:
+        self.world, self.state = world, state
+        self.forest = Forest(world.species, world.placement, world.ground, fade)
+        self.stats: FrameStats | None = None
+        self.way: list[tuple[Eye, float]] = []
+        self._held: set[str] = set()
+        self._drag = np.zeros(2)
+        self._scroll = 0.0
+        self._clock = 0.0
+        self._times: list[float] = []
+        self._panels: Panels | None = None
+        self._followed: tuple[Eye, ...] = ()
+        self._rate = self._at = 0.0
+
+    def load(self, ctx: Context) -> Iterator[float]:
+        """Bring everything onto the GPU."""
+        return self.forest.load(ctx)
+
+    def frame(
+        self,
+        ctx: Context,
+        framebuffer: Framebuffer,
+        size: tuple[int, int],
+        seconds: float,
+    ) -> None:
+        """Move on by so many seconds, and draw."""
+        self._move(seconds)
+        state = self.state
+        look = Look(state.light, state.distances, state.level, state.color, state.wireframe)
+        if state.compare:
+            self._compare(ctx, framebuffer, size, look)
+        else:
+            framebuffer.clear(*_behind(look), 1.0)
+            self.stats = self.forest.draw(state.eye, size, look)
+        if self.stats is not None:
+            took = sum(self.stats.seconds.values())
+            self._times = [*self._times[1 - FRAMES_TOLD :], took]
+            if state.governor is not None:
+                governor = step(state.governor, 1e3 * took, seconds or None)
+                self.state = replace(self.state, governor=governor)
+
+    def overlay(self) -> str:
+        """Figures and help."""
+        parts = []
+        if self.state.told and self.stats is not None:
+            parts.append(self.figures())
+        if self.state.help:
+            parts.append(help_text())
+        return "\n\n".join(parts)
+
+    def figures(self) -> str:
+        """The heads-up display: what the last frames took."""
+        stats, state = self.stats, self.state
+        assert stats is not None
+        mean = float(np.mean(self._times))
+        parts = ", ".join(f"{name} {1e3 * s:.1f}" for name, s in stats.seconds.items())
+        lines = [
+            f"{1 / mean:.1f} fps, {1e3 * mean:.1f} ms ({parts})",
+            f"{stats.plants:,} of {stats.total:,} plants, {stats.tiles:,} tiles",
+            f"{stats.draws:,} draws, {stats.triangles:,} triangles, {stats.fragments:,} fragments",
+            f"{self.forest.texture_bytes / 1e6:.1f} MB of textures",
+            f"distances x {stats.detail:.2f}"
+            + (f", holding {1e3 / state.governor.target_ms:g} fps" if state.governor else ""),
+        ]
+        if state.level is not None:
+            lines.append(f"level {state.level} held")
+        if state.color:
+            lines.append(COLORS[state.color])
+        if state.compare:
+            lines.append(" | ".join(PANELS))
+        if state.recording:
+            lines.append(f"recording: {len(self.way)} frames")
+        return "\n".join([*lines, "h: help"])
+
+    def on(self, event: Event) -> None:
+        """Keys and mouse."""
+        if isinstance(event, Key):
+            name = event.name.lower()
+            if event.pressed:
+                self._held.add(name)
+                if not self.state.recording and name == "r":
+                    self.way = []
+                self.state = pressed(self.state, name)
+            else:
+                self._held.discard(name)
+        elif isinstance(event, Drag):
+            self._drag += (event.right, -event.up)
+        elif isinstance(event, Scroll):
+            self._scroll += event.steps
+
+    def moves(self) -> bool:
+        """Whether anything goes on by itself."""
+        return bool(self._held & MOVING or self._followed) or self.state.governor is not None
+
+    def wants_close(self) -> bool:
+        """Whether the user has enough."""
+        return self.state.closing
+
+    def release(self) -> None:
+        """Free everything on the GPU."""
+        self.forest.release()
+        if self._panels is not None:
+            self._panels.release()
+            self._panels = None
+
+    def look_from(self, eye: Eye) -> None:
+        """Put the eye somewhere."""
+        camera = self.state.camera
+        if isinstance(camera, Fly):
+            self.state = replace(self.state, camera=replace(camera, eye=eye))
+        else:
+            there = orbiting(eye, camera.target, camera.limits_m)
+            self.state = replace(self.state, camera=there)
+
+    def follow(self, eyes: Sequence[Eye], fps: float) -> None:
+        """Walk along a way by itself, again and again, until a key moves the eye."""
+        self._followed, self._rate, self._at = tuple(eyes), fps, 0.0
+
+    def _move(self, seconds: float) -> None:
+        if self._followed and not self._held & MOVING:
+            self._at += seconds * self._rate
+            self.look_from(self._followed[int(self._at) % len(self._followed)])
+        else:
+            self._followed = ()
+        given = Input(
+            frozenset(self._held), (float(self._drag[0]), float(self._drag[1])), self._scroll
+        )
+        self._drag[:], self._scroll = 0.0, 0.0
+        self.state = moved(self.state, given, seconds)
+        self._clock += seconds
+        if self.state.recording:
+            self.way.append((self.state.eye, self._clock))
+
+    def _compare(
+        self,
+        ctx: Context,
+        framebuffer: Framebuffer,
+        size: tuple[int, int],
+        look: Look,
+    ) -> None:
+        """Three pictures beside each other: as it is drawn, in full, and how they differ."""
+        if self._panels is None:
+            self._panels = Panels(ctx)
+        part = (max(size[0] // 3, 1), size[1])
+        full = replace(look, detail=IN_FULL, level=0, color=0)
+        for index, one in enumerate((look, full)):
+            self._panels.begin(index, part, _behind(one))
+            drawn = self.forest.draw(self.state.eye, part, one)
+            if index == 0:
+                self.stats = drawn
+            self._panels.end(index)
+        framebuffer.use()
+        self._panels.show(size)
+
+
+def _behind(look: Look) -> tuple[float, float, float]:
+    return (0.0, 0.0, 0.0) if COLORS[look.color] == "by overdraw" else SKY

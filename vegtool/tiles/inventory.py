@@ -1,0 +1,246 @@
+"""Plants from a file with a row for each: a survey, a register of trees, points from a scan.
+
+A row's place on the map becomes metres from the scene's origin in float64, before anything is
+rounded, so that coordinates of millions of metres keep every plant within a millimetre. Where the
+scene has ground, plants stand on it. Columns and formats are described in docs/placement.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vegtool.arrays import FloatArray, IntArray, SingleArray
+from vegtool.errors import InputError, UsageError
+from vegtool.progress import Progress
+from vegtool.scene import Scene
+from vegtool.tiles.hashing import draws, hashes, key
+from vegtool.tiles.order import spread_order
+from vegtool.tiles.placement import LongArray, Plants, Tiles
+from vegtool.tiles.projection import NORTHERN, SOUTHERN, zone_at, zone_of
+from vegtool.tiles.rows import Rows, read_rows
+from vegtool.tiles.terrain import Terrain
+from vegtool.tiles.variation import DRAWS, heights, tints, yaws
+
+FAR_M = 100_000.0
+"""Metres: coordinates beyond are a map's, others may be the scene's own."""
+WORLD = ("EPSG:4326", "EPSG:4258", "OGC:CRS84")
+"""Coordinate reference systems of longitude and latitude."""
+HALF = 2**30
+"""Tiles on either side of the origin."""
+
+
+@dataclass(frozen=True, eq=False)
+class Inventory:
+    """A Placement whose plants are all there, sorted by tile.
+
+    first: (t + 1,) int64 where the plants of each tile begin, and how many there are. center:
+    (t, 3) float64 metres, the tiles' origins. The others, of all plants: as those of Plants.
+    """
+
+    tile_m: float
+    origin: FloatArray
+    tiles: Tiles
+    first: LongArray
+    center: FloatArray
+    offset: SingleArray
+    species: IntArray
+    yaw: SingleArray
+    height: SingleArray
+    tint: SingleArray
+    row: LongArray
+    notes: tuple[str, ...] = ()
+
+    def plants(self, tile: int, most: int | None = None) -> Plants:
+        """The plants of a tile, 0..t-1, or the first `most` of them."""
+        first, last = int(self.first[tile]), int(self.first[tile + 1])
+        part = slice(first, last if most is None else min(first + most, last))
+        return Plants(
+            self.center[tile],
+            self.offset[part],
+            self.species[part],
+            self.yaw[part],
+            self.height[part],
+            self.tint[part],
+            self.row[part],
+        )
+
+
+def place(scene: Scene, terrain: Terrain, tile_m: float, progress: Progress) -> Inventory:
+    """The plants of a file on the scene's ground; see `placement_of`."""
+    progress("placement", 0.0)
+    rows = read_rows(scene)
+    progress("placement", 0.5)
+    notes = list(rows.notes)
+    east, north, origin = _on_the_map(scene, terrain, rows, notes)
+    xz = np.stack([east - origin[0], origin[1] - north], axis=1)
+    on = terrain.inside(xz)
+    if not on.all():
+        notes.append(_outside(terrain, rows, xz, on))
+        xz, rows = xz[on], rows.only(on)
+    feet = np.stack([xz[:, 0], _ground(terrain, rows, xz, notes), xz[:, 1]], axis=1)
+    random = draws(hashes(key(scene.placement.seed or 0), rows.row), DRAWS)
+    usual = heights(random, rows.species, scene.species)
+    height = np.where(np.isnan(rows.height), usual, rows.height).astype(np.float32)
+    yaw = np.where(np.isnan(rows.yaw), yaws(random), rows.yaw).astype(np.float32)
+    order, tile = _order(xz, height, tile_m)
+    ends = np.flatnonzero(np.diff(tile, append=np.iinfo(np.int64).max)) + 1
+    first = np.concatenate([[0], ends])
+    center, offset, tiles = _tiles(feet[order], first)
+    progress("placement", 1.0)
+    return Inventory(
+        tile_m,
+        origin,
+        tiles,
+        first,
+        center,
+        offset,
+        rows.species[order],
+        yaw[order],
+        height[order],
+        tints(random)[order],
+        rows.row[order],
+        tuple(notes),
+    )
+
+
+def _on_the_map(
+    scene: Scene, terrain: Terrain, rows: Rows, notes: list[str]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """(n,) metres east and north on the map, and (3,) what of it is the scene's origin."""
+    crs = terrain.crs
+    world = crs is not None and crs.upper() in WORLD
+    origin = terrain.origin
+    if not (rows.columns.geographic or world):
+        return rows.x, rows.y, _origin(scene, terrain, rows, rows.x, rows.y, notes)
+    middle = [(values.min() + values.max()) / 2 for values in (rows.x, rows.y)]
+    in_degrees = crs is None or world
+    if in_degrees and origin is not None:
+        middle = [float(origin[0]), float(origin[1])]
+    zone = zone_at(*middle) if in_degrees else zone_of(str(crs))
+    if zone is None:
+        raise UsageError(
+            f"{rows.table.path}: has longitude and latitude, and the ground is in {crs}; expected "
+            "a UTM zone, such as EPSG:25832; project the inventory, for example with ogr2ogr "
+            f"-t_srs {crs}"
+        )
+    _check_degrees(rows)
+    if in_degrees:
+        notes.append(
+            f"{rows.table.path}: longitude and latitude became metres in {zone.crs}, UTM zone "
+            f"{zone.number}"
+        )
+    east, north = zone.project(rows.x, rows.y)
+    if in_degrees and origin is not None:
+        there = zone.project(*(np.array([value]) for value in middle))
+        return east, north, np.array([there[0][0], there[1][0], 0.0])
+    return east, north, _origin(scene, terrain, rows, east, north, notes)
+
+
+def _check_degrees(rows: Rows) -> None:
+    """UTM ends before the poles; where the scene says that they are degrees, so does 180."""
+    for meaning, values, least, most in (
+        ("x", rows.x, -180.0, 180.0),
+        ("y", rows.y, SOUTHERN, NORTHERN),
+    ):
+        wrong = np.flatnonzero((values < least) | (values > most))
+        if wrong.size:
+            index = int(wrong[0])
+            raise rows.table.error(
+                int(rows.row[index]),
+                rows.table.names[rows.columns.number[meaning]],
+                f"{least:g} to {most:g} degrees",
+                float(values[index]),
+            )
+
+
+def _origin(
+    scene: Scene,
+    terrain: Terrain,
+    rows: Rows,
+    east: FloatArray,
+    north: FloatArray,
+    notes: list[str],
+) -> FloatArray:
+    """(3,) the scene's origin on the map: as the ground says; else the map's own, unless it is so
+    far away that the middle of the inventory must be meant."""
+    if terrain.origin is not None:
+        return terrain.origin
+    if max(abs(east).max(), abs(north).max()) <= FAR_M:
+        return np.zeros(3)
+    middle = [round((values.min() + values.max()) / 2) for values in (east, north)]
+    said = f"origin = [{middle[0]}, {middle[1]}]"
+    if terrain.kind == "heightmap":
+        raise UsageError(
+            f"{scene.at('terrain', 'heightmap')}: expected origin in [terrain], where the middle "
+            f"of the heights is on the map, as {rows.table.path} is far from 0; got none; the "
+            f"inventory's middle is {said}"
+        )
+    notes.append(
+        f"{rows.table.path}: the scene's origin is put at its middle, {said}; say another in "
+        "[terrain]"
+    )
+    return np.array([*middle, 0.0], dtype=np.float64)
+
+
+def _outside(terrain: Terrain, rows: Rows, xz: FloatArray, on: np.ndarray) -> str:
+    """A note on plants that stand beyond the ground. Raises InputError where all do."""
+    assert terrain.extent is not None
+    first = int(np.argmin(on))
+    at = f"x = {xz[first, 0]:.2f}, z = {xz[first, 1]:.2f} m from the scene's origin"
+    ground = f"the ground of {terrain.extent[0]:g} x {terrain.extent[1]:g} m"
+    if not on.any():
+        raise InputError(
+            f"{rows.at(first)}: expected plants on {ground}, found none; the first is at {at}; say "
+            "where the ground is with origin in [terrain]"
+        )
+    count = int(np.count_nonzero(~on))
+    return (
+        f"{rows.table.path}: plants that are not on {ground} and left out: {count:,}, the first in "
+        f"{rows.table.place(int(rows.row[first]))}, at {at}"
+    )
+
+
+def _ground(terrain: Terrain, rows: Rows, xz: FloatArray, notes: list[str]) -> FloatArray:
+    """(n,) metres, how high the plants' feet are."""
+    height, known = terrain.height(xz), np.isfinite(rows.z)
+    if not known.any():
+        return height
+    if terrain.kind == "none":
+        if not known.all():
+            count = int(np.count_nonzero(~known))
+            notes.append(f"{rows.table.path}: plants without z, which stand at height 0: {count:,}")
+        return np.where(known, rows.z, height)
+    off = float(np.median(rows.z[known] - height[known]))
+    if abs(off) > 0.5:
+        notes.append(
+            f"{rows.table.path}: plants stand on the scene's ground; z, which is not used, is "
+            f"{abs(off):.1f} m {'above' if off > 0 else 'below'} it, in the median"
+        )
+    return height
+
+
+def _order(xz: FloatArray, height: SingleArray, tile_m: float) -> tuple[LongArray, LongArray]:
+    """(n,) the order of plants, and, in that order, numbers of their tiles, ascending."""
+    square = np.floor(xz / tile_m)
+    number = square.astype(np.int64) + HALF
+    tile = number[:, 1] * (2 * HALF) + number[:, 0]
+    # Of a height that is not known, the model may be a tree.
+    tall = np.where(np.isnan(height), np.nanmax(height, initial=0.01), height).astype(np.float64)
+    by_tile = np.argsort(tile, kind="stable")
+    inner = np.minimum((xz / tile_m - square)[by_tile], np.nextafter(1.0, 0.0))
+    order = by_tile[spread_order(inner, tile[by_tile], tall[by_tile])]
+    return order, tile[order]
+
+
+def _tiles(feet: FloatArray, first: LongArray) -> tuple[FloatArray, SingleArray, Tiles]:
+    """Centers (t, 3) of tiles, offsets (n, 3) from them, and bounds, which hold what is rounded."""
+    starts, count = first[:-1], np.diff(first)
+    low, high = (least.reduceat(feet, starts, axis=0) for least in (np.minimum, np.maximum))
+    center = (low + high) / 2
+    offset = (feet - np.repeat(center, count, axis=0)).astype(np.float32)
+    corners = [
+        center + least.reduceat(offset, starts, axis=0) for least in (np.minimum, np.maximum)
+    ]
+    return center, offset, Tiles(corners[0], corners[1], count)
