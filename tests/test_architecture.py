@@ -19,14 +19,15 @@ GROUND = {
 """Contracts that every room may import."""
 
 MAY_IMPORT: dict[str, set[str]] = {
-    "formats": set(),
+    "formats": {"tangents"},
     "growth": set(),
     "branches": {"formats"},
     "clustering": {"branches"},
     "boxes": set(),
     "lighting": set(),
     "elements": {"branches"},
-    "gl": {"lighting", "elements"},
+    "tangents": set(),
+    "gl": {"lighting", "elements", "tangents"},
     "baking": {"gl"},
     "measure": {"gl", "lighting"},
     "baselines": {"formats", "baking", "gl", "measure"},

@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from vegtool.formats.tangents import tangents
+from vegtool.tangents import tangents
 from vegtool.lod import Atlas, Billboards, Display, Level, billboard_quads, level_triangles
 from vegtool.plant import Material, Plant
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from written import upright_square
 
-from vegtool.formats.tangents import tangents
+from vegtool.tangents import tangents
 
 FACES = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
 UP = np.tile([0.0, 0.0, 1.0], (4, 1))

@@ -24,9 +24,9 @@ from vegtool.formats.glb import ELEMENT_ARRAY_BUFFER, Document
 from vegtool.formats.gltf_material import TRANSMISSION, UNLIT
 from vegtool.formats.manifest import LevelFile, encode, manifest, screen_height_fraction
 from vegtool.formats.ramp import RAMP, on_ramp
-from vegtool.formats.tangents import tangents
 from vegtool.lod import Level, LodChain, level_triangles
 from vegtool.plant import Branches, Material, Plant, Texture
+from vegtool.tangents import tangents
 
 ALPHA_CUTOFF = 0.5  # of a billboard: what baking/coverage.py fits its alpha to
 ROUGHNESS = 0.9  # of a billboard: foliage seen from afar has no highlight of its own

@@ -13,12 +13,13 @@ from typing import Literal
 import moderngl
 import numpy as np
 
-from vegtool.arrays import SingleArray
+from vegtool.arrays import FloatArray, IntArray, SingleArray
 from vegtool.elements import Elements
 from vegtool.gl.context import OnGpu
 from vegtool.gl.program import program
 from vegtool.gl.upload import MaterialGroup, PlantBuffers
 from vegtool.plant import Plant
+from vegtool.tangents import tangents
 
 INSTANCE = np.dtype([("place", "f4", 4), ("turn", "f4", 4), ("shown", "f4", 3), ("tint", "u1", 4)])
 """place: metres from the eye to the foot, scale. turn: cosine and sine of the turn about y, share
@@ -28,7 +29,8 @@ to 255 for linear factors of 0 to 2."""
 WHOLE = 1 / (1 - 0.1)
 """Share from which on all elements are whole (GROWING in instance.vert)."""
 VERTEX = (
-    ("in_position_u", 4), ("in_normal_v", 4), ("in_color", 4), ("in_middle_rank", 4), ("in_more", 4)
+    ("in_position_u", 4), ("in_normal_v", 4), ("in_color", 4), ("in_middle_rank", 4),
+    ("in_more", 4), ("in_tangent", 4),
 )  # fmt: skip
 """Attributes of vertices and their floats."""
 PER_INSTANCE = (
@@ -59,8 +61,9 @@ class InstancedPlant(OnGpu):
         self.plant, self.elements = plant, elements
         self.buffers = PlantBuffers(plant, mipmaps=mipmaps, keep_coverage=mipmaps, ctx=ctx)
         self.ctx = self.buffers.ctx
-        self._vertices = self.ctx.buffer(vertex_rows(plant, elements).tobytes())
-        self._indices = self.ctx.buffer(elements.faces.astype(np.uint32).tobytes())
+        rows, faces = vertex_rows(plant, elements)
+        self._vertices = self.ctx.buffer(rows.tobytes())
+        self._indices = self.ctx.buffer(faces.astype(np.uint32).tobytes())
         self._arrays: dict[moderngl.Program, moderngl.VertexArray] = {}
         ends = np.searchsorted(elements.face_material, np.arange(len(plant.materials) + 1))
         self._ranges = [(int(a), int(b)) for a, b in pairwise(ends)]
@@ -119,20 +122,27 @@ class InstancedPlant(OnGpu):
         return array
 
 
-def vertex_rows(plant: Plant, elements: Elements) -> SingleArray:
-    """(v, 20) float32: VERTEX of the elements' vertices."""
-    of = elements.vertex
+def vertex_rows(plant: Plant, elements: Elements) -> tuple[SingleArray, IntArray]:
+    """(v, 24) float32: VERTEX of the elements' vertices, and (f, 3) the faces of those: vertices on
+    the seams of mirrored textures are two."""
+    of, faces = elements.vertex, elements.faces
+    split = np.arange(len(of), dtype=np.int32)
+    frame: FloatArray = np.zeros((len(of), 4))
+    if any(material.normal_texture is not None for material in plant.materials):
+        frame, split, faces = tangents(plant.positions[of], plant.normals[of], plant.uvs[of], faces)
+    of = of[split]
     rows = np.zeros((len(of), sum(n for _, n in VERTEX)), np.float32)
     rows[:, 0:3] = plant.positions[of]
     rows[:, 3], rows[:, 7] = plant.uvs[of].T
     rows[:, 4:7] = plant.normals[of]
     rows[:, 8:12] = 1.0 if plant.colors is None else plant.colors[of]
-    rows[:, 12:15] = elements.middle
-    rows[:, 15] = elements.rank
+    rows[:, 12:15] = elements.middle[split]
+    rows[:, 15] = elements.rank[split]
     rows[:, 16:18] = 1.0 if plant.exposure is None else plant.exposure[of]
-    rows[:, 18] = elements.grows
+    rows[:, 18] = elements.grows[split]
     rows[:, 19] = without_texels(plant)[of]
-    return rows
+    rows[:, 20:24] = frame
+    return rows, faces
 
 
 View = Literal["lit", "painted", "overdraw"]
@@ -166,6 +176,7 @@ def instance_program(
         "NO_COLOR_MAP": material.color_texture is None,
         "UNLIT": material.unlit,
         "NORMAL_MAP": group.normal_map is not None and not material.unlit,
+        "TANGENTS": group.normal_map is not None and not material.unlit,
         "LIGHT_MAP": group.light_map is not None and not material.unlit,
         "SOFT_EDGES": buffers.mipmaps and not plain,
         "REVEAL": bool(fading) and (fading == "pixels" or not plain),

@@ -20,7 +20,16 @@ from vegtool.gl.draw import MSAA
 from vegtool.gl.instances import INSTANCE, WHOLE
 from vegtool.gl.landscape import Batch, Frame, Landscape, picture
 from vegtool.lighting.light import Light
-from vegtool.preview.choice import Correction, Kinds, Seen, chosen, frame
+from vegtool.preview.choice import (
+    BEYOND,
+    Correction,
+    Kinds,
+    Seen,
+    Switches,
+    chosen,
+    frame,
+    switches,
+)
 from vegtool.preview.eye import Eye
 from vegtool.preview.library import Species
 from vegtool.preview.options import FadeMode
@@ -41,17 +50,16 @@ LARGEST_PX = 400
 """Pixels across of a picture: nearer plants are whole."""
 
 
-def distances(kinds: Kinds, kind: int) -> FloatArray:
+def distances(at: Switches, kind: int) -> FloatArray:
     """(k,) metres, ascending, at which a kind is compared."""
-    count = int(kinds.count[kind])
-    found = [float(kinds.whole_m[kind])]
-    ends = float(kinds.whole_m[kind])
+    count, ends = int(at.count[kind]), float(at.whole_m[kind])
+    found = [ends]
     for level in range(1, count):
-        start, length = kinds.switch_m[kind, level], kinds.fade[kind, level]
+        start, end = float(at.start[kind, level]), float(at.end[kind, level])
         found.append((ends * start) ** 0.5)
-        found += [start * (1 + length * along) for along in ALONG_FADE]
-        ends = found[-1]
-    found += [2 * ends, 4 * ends]
+        found += [start + (end - start) * along for along in ALONG_FADE]
+        ends = end
+    found += [BEYOND**0.5 * ends, BEYOND * ends]
     return np.unique(np.array(found))
 
 
@@ -72,7 +80,9 @@ def corrected(
 
     elements: of the original. landscape: of which the kinds are. focal_px: as of the kinds.
     """
-    at = distances(kinds, kind)
+    levels = switches(kinds, 1.0)
+    at = distances(levels, kind)
+    stage = levels.stage(np.full(len(at), kind), at.astype(np.float32))
     factor = np.ones(len(at))
     with Landscape([np.zeros((8, 8), np.uint8)], ctx=landscape.ctx) as truth:
         truth.add(species.levels[0], elements, mipmaps=False)
@@ -89,7 +99,7 @@ def corrected(
                     drawn += _covered(landscape, frame(view[2], what), view, 1, MSAA)
                 ratio = wanted / drawn if drawn > 0 and wanted > 0 else 1.0
                 factor[i] = np.clip(factor[i] * ratio**0.5, 1 / LARGEST, LARGEST)
-            yield (i + 1) / len(at), (np.log(at), factor)
+            yield (i + 1) / len(at), (stage, factor)
 
 
 def _view(kinds: Kinds, kind: int, distance: float, azimuth: int, focal_px: float) -> View:

@@ -6,6 +6,11 @@ billboards; between, geometry is reduced as distance grows while billboards appe
 for later levels among themselves. Cook, Halstead, Planck, Ryu (2007): of the geometry that is left,
 what remains is enlarged.
 
+Levels are used from the distances that their manifest states, or nearer, where time is short: then
+every plant has as many triangles as its picture has room for, the same number to the pixel. Where
+the error of a pixel depends on how many triangles show it, no other way to spend so many triangles
+has less error (Lagrange's condition: the gain of one more is the same everywhere).
+
 Tiles are culled first and plants second, both in arrays.
 """
 
@@ -31,7 +36,12 @@ GROWTH = 0.4
 NEAR_SPARE = 2.0
 """Of the original where its first level takes over: triangles times those of the level. Leaves that
 were left out at random serve worse than triangles that were chosen."""
-LEAST_TRIANGLES = 4.0
+TRIANGLES_A_PIXEL = 1.0
+"""Of the square around a plant, at detail 1: more are never drawn of a level."""
+TEXTURED = 0.5
+"""Where a level without textures follows one with them, it does at this share of the distance: what
+is cut out by alpha takes a processor six times as long as plain triangles of the same pixels."""
+LEAST_TRIANGLES = 2.0
 """Of a plant, before plants of its kind are left out."""
 WIDEST = 3.0
 """Factor of the width of plants that stand for others."""
@@ -42,48 +52,38 @@ SHARES = 2.0**0.5
 OVERLAP = 0.85
 """Two levels that fade into each other cover some places both: each shows its share to this power,
 which is more than its share."""
+BEYOND = 4.0
+"""Times the distance of the last level: along it, stages go on (`Switches.stage`)."""
 NO_LEVEL = 255
 """Of a plant that was not drawn yet."""
-PIXELS_A_TRIANGLE = 2.0
-"""Of a model without levels: its geometry is whole where triangles are that large."""
-
 
 Correction = tuple[FloatArray, FloatArray]
-"""(k,) logarithms of distances, ascending, and (k,) factors there."""
+"""(k,) stages (`Switches.stage`), ascending, and (k,) factors of lengths there (calibrate.py)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Kinds:
     """Levels of all species in one picture's terms; s species, l levels at most.
 
-    switch_m: (s, l) metres at which each level may be used, of scale 1 and detail 1; infinite where
-    there is none. fade: (s, l). model: (s, l) int32, index in the landscape. count: (s,) levels.
-    triangles: (s, l). opaque: (s, l) bool, fades by elements; else by texels. center: (s,) metres
-    above the foot, and radius: (s,), of what a plant fills. whole_m: (s,) metres, up to which the
-    original is whole. coarse_m: (s,) metres, up to which its last level is. thinned_m: (s,), up to
-    which all plants are drawn. corrections: for each kind, (k,) logarithms of distances of plants
-    of scale 1 at detail 1, ascending, and (k,) factors of lengths there; see calibrate.py.
+    switch_m: (s, l) metres at which each level may be used, of plants of scale 1; infinite where
+    there is none. room_m: (s, l) metres at which there is room for no more triangles than it has.
+    fade: (s, l). model: (s, l) int32, index in the landscape. triangles: (s, l). count: (s,) levels. opaque: (s,
+    l) bool, fades by elements; else by texels. center: (s,) metres above the foot, and radius:
+    (s,), of what a plant fills. thinned_m: (s,), up to which all plants are drawn. corrections: of
+    each kind.
     """
 
     switch_m: FloatArray
+    room_m: FloatArray
     fade: FloatArray
     model: IntArray
+    triangles: FloatArray
     count: IntArray
     opaque: np.ndarray
     center: FloatArray
     radius: FloatArray
-    whole_m: FloatArray
-    coarse_m: FloatArray
     thinned_m: FloatArray
     corrections: tuple[Correction, ...] = ()
-
-    def lengths(self, kind: np.ndarray, away: np.ndarray) -> np.ndarray:
-        """(n,) factor of the lengths of elements of plants of a kind that far away."""
-        result = np.ones(len(kind), np.float32)
-        for index, (at, factor) in enumerate(self.corrections):
-            here = np.flatnonzero(kind == index)
-            result[here] = np.interp(np.log(away[here]), at, factor, left=1.0)
-        return result
 
 
 def kinds_of(
@@ -98,32 +98,80 @@ def kinds_of(
     """
     most = max(len(one.levels) for one in species)
     shape = (len(species), most)
-    switch, fade = np.full(shape, np.inf), np.zeros(shape)
-    index, opaque = np.zeros(shape, np.int32), np.zeros(shape, bool)
+    switch, room, fade = np.full(shape, np.inf), np.full(shape, np.inf), np.zeros(shape)
+    index, opaque, triangles = np.zeros(shape, np.int32), np.zeros(shape, bool), np.ones(shape)
     count = np.array([len(one.levels) for one in species], np.int32)
-    center, radius = np.zeros(len(species)), np.zeros(len(species))
-    whole, coarse, thinned = (np.zeros(len(species)) for _ in range(3))
+    center, radius, thinned = (np.zeros(len(species)) for _ in range(3))
     for i, one in enumerate(species):
-        n = len(one.levels)
+        n, plant = len(one.levels), one.levels[0]
+        reach = plant.extent * focal_px * TRIANGLES_A_PIXEL**0.5
+        triangles[i, :n] = [len(e.faces) for e in elements[i]]
         switch[i, :n] = one.switch_m * focal_px / one.focal_px
+        room[i, :n] = reach / np.sqrt(triangles[i, :n])
+        textured = np.array([any(m.textures for m in level.materials) for level in one.levels])
+        room[i, 1:n] *= np.where(textured[: n - 1] & ~textured[1:], TEXTURED, 1.0)
         fade[i, :n] = one.fade
         index[i, :n] = model[i]
         opaque[i, :n] = [
             all(m.alpha_mode == "opaque" for m in level.materials) for level in one.levels
         ]
-        low, high = one.levels[0].bounds
+        low, high = plant.bounds
         center[i] = (low[1] + high[1]) / 2
-        reach = np.abs(np.stack([low, high])).max(axis=0)
-        radius[i] = float(np.hypot(np.hypot(reach[0], reach[2]), (high[1] - low[1]) / 2))
-        faces = [len(e.faces) for e in elements[i]]
-        if n > 1:
-            whole[i] = switch[i, 1] * min((NEAR_SPARE * faces[1] / faces[0]) ** 0.5, 1.0)
-            coarse[i] = switch[i, n - 1]
-        else:
-            area = float(one.levels[0].face_areas.mean())
-            whole[i] = coarse[i] = focal_px * (area / PIXELS_A_TRIANGLE) ** 0.5
-        thinned[i] = coarse[i] * max(faces[-1] / LEAST_TRIANGLES, 1.0) ** 0.5
-    return Kinds(switch, fade, index, count, opaque, center, radius, whole, coarse, thinned)
+        side = np.abs(np.stack([low, high])).max(axis=0)
+        radius[i] = float(np.hypot(np.hypot(side[0], side[2]), (high[1] - low[1]) / 2))
+        thinned[i] = reach / LEAST_TRIANGLES**0.5
+    return Kinds(
+        switch, room, fade, index, triangles, count, opaque, center, radius, thinned
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Switches:
+    """Where levels follow each other at a detail, float32, of plants of scale 1.
+
+    start, end: (s, l) metres, of each level's fade. whole_m: (s,) metres, up to which the original
+    is drawn whole. coarse_m: (s,) metres, up to which the last level is.
+    """
+
+    start: np.ndarray
+    end: np.ndarray
+    whole_m: np.ndarray
+    coarse_m: np.ndarray
+    count: np.ndarray
+
+    def stage(self, kind: np.ndarray, away: np.ndarray) -> np.ndarray:
+        """(n,) how far on its way through its levels a plant is, whatever the detail: l to l + 0.5
+        while level l fades in, l + 0.5 to l + 1 until the next one does."""
+        level = (away[:, None] >= self.start[kind]).sum(axis=1) - 1
+        each = np.arange(len(kind))
+        start, end = self.start[kind], self.end[kind]
+        last = level == self.count[kind] - 1
+        here, ended = start[each, level], end[each, level]
+        nothing = level == 0
+        ended = np.where(nothing, self.whole_m[kind], ended)
+        following = start[each, np.minimum(level + 1, start.shape[1] - 1)]
+        following = np.where(last, BEYOND * ended, following)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            fading = np.where(nothing, 1.0, (away - here) / (ended - here))
+            between = np.log(away / ended) / np.log(following / ended)
+        between = np.where(np.isfinite(between), between, 0.0)
+        return np.asarray(level + 0.5 * (np.clip(fading, 0, 1) + np.clip(between, 0, 1)))
+
+
+def switches(kinds: Kinds, detail: float) -> Switches:
+    """Where levels follow each other: from the stated distances on, or from where there is no room
+    for more triangles. detail: factor of the distances at which there is room."""
+    start = np.minimum(kinds.switch_m, detail * kinds.room_m).astype(np.float32)
+    start[:, 0] = 0.0
+    end = (start * (1 + kinds.fade)).astype(np.float32)
+    last = kinds.count - 1
+    each = np.arange(len(last))
+    coarse = (detail * kinds.room_m[each, last]).astype(np.float32)
+    whole = coarse.copy()
+    if start.shape[1] > 1:
+        spare = np.minimum(NEAR_SPARE * kinds.triangles[:, 1] / kinds.triangles[:, 0], 1.0) ** 0.5
+        whole = np.where(last > 0, start[:, 1] * spare, whole).astype(np.float32)
+    return Switches(start, end, whole, coarse, kinds.count)
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,39 +248,43 @@ class Chosen:
 
 
 def chosen(
-    found: Seen, kinds: Kinds, detail: float, mode: FadeMode, held: int | None = None,
+    found: Seen,
+    kinds: Kinds,
+    detail: float,
+    mode: FadeMode,
+    held: int | None = None,
     before: np.ndarray | None = None,
-) -> Chosen:  # fmt: skip
+) -> Chosen:
     """The levels of the plants. held: the one that all are to have, or the last before it. before:
     (n,) uint8 the levels that they had, NO_LEVEL for none, which those that do not fade keep as
     long as they may."""
-    kind = found.rows["species"]
-    away = (found.distance / (found.rows["scale"] * np.float32(detail))).astype(np.float32)
-    switch = kinds.switch_m.astype(np.float32)[kind]
-    fade = kinds.fade.astype(np.float32)[kind]
-    level = ((away[:, None] >= switch).sum(axis=1) - 1).astype(np.int64)
+    kind, at = found.rows["species"], switches(kinds, detail)
+    away = found.distance / found.rows["scale"]
+    start, end = at.start[kind], at.end[kind]
+    level = ((away[:, None] >= start).sum(axis=1) - 1).astype(np.int64)
     each = np.arange(len(kind))
     share = np.ones(len(kind), np.float32)
     if held is not None:
         level = np.minimum(held, kinds.count[kind] - 1).astype(np.int64)
     elif mode == "none":
         if before is not None:
-            left = ((away[:, None] >= switch * (1 + fade)).sum(axis=1) - 1).astype(np.int64)
+            left = ((away[:, None] >= end).sum(axis=1) - 1).astype(np.int64)
             level = np.where(before == NO_LEVEL, level, np.clip(before, left, level))
     else:
-        start, length = switch[each, level], fade[each, level] * switch[each, level]
-        np.divide(away - start, length, out=share, where=length > 0)
+        first, length = start[each, level], end[each, level] - start[each, level]
+        np.divide(away - first, length, out=share, where=length > 0)
         share = np.minimum(share, 1)
     fades = np.flatnonzero(share < 1)
     of = np.concatenate([each, fades])
-    at = np.concatenate([level, level[fades] - 1])
+    drawn = np.concatenate([level, level[fades] - 1])
     comes = np.concatenate([share, share[fades]])
     leaves = np.arange(len(of)) >= len(each)
-    whole = _share_whole(kinds, kind[of], at, away[of])
-    kept = whole * WHOLE
-    enlarged = whole**-GROWTH * kinds.lengths(kind[of], away[of])
+    whole = _share_whole(at, kind[of], drawn, away[of])
+    kept, enlarged = whole * WHOLE, whole**-GROWTH
+    if held is None:
+        enlarged *= _lengths(kinds, kind, at.stage(kind, away))[of]
     shown, solid = np.full(len(of), 2.0), np.ones(len(of))
-    by_elements = kinds.opaque[kind[of], at] | (at == 0)
+    by_elements = kinds.opaque[kind[of], drawn] | (drawn == 0)
     fading = np.concatenate([share < 1, np.ones(len(fades), bool)])
     if mode == "dither":
         shown = np.where(fading, np.where(leaves, -comes - 1e-6, comes), shown)
@@ -243,15 +295,24 @@ def chosen(
         fading &= ~by_elements
         shown = np.where(fading, threshold_of(visible), shown)
         solid = np.where(fading, visible, solid)
-    model = kinds.model[kind[of], at]
-    return Chosen(of, at.astype(np.uint8), model, kept, enlarged, shown, solid, fading)
+    model = kinds.model[kind[of], drawn]
+    return Chosen(of, drawn.astype(np.uint8), model, kept, enlarged, shown, solid, fading)
 
 
-def _share_whole(kinds: Kinds, kind: np.ndarray, level: np.ndarray, away: np.ndarray) -> np.ndarray:
+def _share_whole(at: Switches, kind: np.ndarray, level: np.ndarray, away: np.ndarray) -> np.ndarray:
     """(m,) of a level's elements, how many are drawn that far away where nothing fades."""
-    first, last = level == 0, level == kinds.count[kind] - 1
-    until = np.where(first, kinds.whole_m[kind], np.where(last, kinds.coarse_m[kind], np.inf))
+    first, last = level == 0, level == at.count[kind] - 1
+    until = np.where(first, at.whole_m[kind], np.where(last, at.coarse_m[kind], np.inf))
     return np.asarray(np.minimum((until / away) ** 2, 1.0))
+
+
+def _lengths(kinds: Kinds, kind: np.ndarray, stage: np.ndarray) -> np.ndarray:
+    """(n,) factor of the lengths of elements."""
+    result = np.ones(len(kind))
+    for index, (at, factor) in enumerate(kinds.corrections):
+        here = np.flatnonzero(kind == index)
+        result[here] = np.interp(stage[here], at, factor, left=1.0)
+    return result
 
 
 def frame(found: Seen, what: Chosen, paint: np.ndarray | None = None) -> Frame:

@@ -13,12 +13,12 @@ from time import perf_counter
 
 import numpy as np
 
-from vegtool.arrays import FloatArray
+from vegtool.arrays import FloatArray, Picture
 from vegtool.elements import Elements, ordered
 from vegtool.gl.context import OnGpu
 from vegtool.gl.draw import MSAA
 from vegtool.gl.instances import View
-from vegtool.gl.landscape import GroundMesh, Landscape
+from vegtool.gl.landscape import GroundMesh, Landscape, picture
 from vegtool.gl.window_client import Context
 from vegtool.lighting.light import Light
 from vegtool.preview.calibrate import corrected
@@ -83,7 +83,8 @@ class FrameStats:
 class Forest(OnGpu):
     """Species, where they stand, and the ground, on the GPU. A context manager: leaving releases.
 
-    Making one does nothing: `load` does, a bit at a time.
+    Making one does nothing: `load` does, a bit at a time. sharp: without mips, for pictures that are
+    supersampled, as of plants in full.
     """
 
     def __init__(
@@ -92,9 +93,11 @@ class Forest(OnGpu):
         placement: Placement,
         ground: GroundMesh | None = None,
         fade: FadeMode = "alpha-test",
+        *,
+        sharp: bool = False,
     ) -> None:
         self.species, self.placement = tuple(species), placement
-        self.ground, self.fade = ground, fade
+        self.ground, self.fade, self.sharp = ground, fade, sharp
         self.total = int(placement.tiles.count.sum())
         self._landscape: Landscape | None = None
         self._elements: list[list[Elements]] = []
@@ -117,9 +120,11 @@ class Forest(OnGpu):
             for level in one.levels:
                 elements = ordered(level)
                 self._elements[-1].append(elements)
-                self._models[-1].append(landscape.add(level, elements))
+                self._models[-1].append(landscape.add(level, elements, mipmaps=not self.sharp))
                 done += 1
                 yield done / total
+        if self.sharp:
+            return
         plain = kinds_of(self.species, self._elements, self._models, CALIBRATED_PX)
         for index, one in enumerate(self.species):
             steps = corrected(
@@ -129,7 +134,7 @@ class Forest(OnGpu):
             for share, found in steps:  # noqa: B007  # the last one is the whole
                 yield (done + share * len(one.levels)) / total
             done += len(one.levels)
-            self._corrections.append((found[0] - np.log(CALIBRATED_PX), found[1]))
+            self._corrections.append(found)
 
     def release(self) -> None:
         """Free everything on the GPU."""
@@ -167,6 +172,22 @@ class Forest(OnGpu):
             look.detail,
             {"choose": chosen_at - started, "draw": ended - chosen_at},
         )
+
+    def picture(
+        self,
+        eye: Eye,
+        size: tuple[int, int],
+        look: Look = Look(),
+        supersample: int = 1,
+        samples: int = MSAA,
+    ) -> Picture:
+        """What `draw` draws, as light and coverage, the ground included: see gl.landscape.picture."""
+        landscape = self._landscape
+        if landscape is None:
+            raise ValueError("Forest.picture: load it first")
+        found, what, _ = self.choose(eye, size, look)
+        drawn = frame(found, what, self._paint(found, what, look.color))
+        return picture(landscape, drawn, eye.shot(*size), look.light, supersample, samples)
 
     def choose(
         self, eye: Eye, size: tuple[int, int], look: Look
@@ -213,8 +234,7 @@ class Forest(OnGpu):
             self._stocks.clear()
             self._kept = 0
             plain = kinds_of(self.species, self._elements, self._models, focal_px)
-            moved = tuple((at + np.log(focal_px), factor) for at, factor in self._corrections)
-            self._kinds[focal_px] = replace(plain, corrections=moved)
+            self._kinds[focal_px] = replace(plain, corrections=tuple(self._corrections))
         return self._kinds[focal_px]
 
     def _stock(self, tile: int, kinds: Kinds) -> Stock:

@@ -16,6 +16,9 @@ in vec4 in_normal_v;
 in vec4 in_color;
 in vec4 in_middle_rank;  // of the element
 in vec4 in_more;         // exposure of both sides; whether the element is enlarged; is without texels
+#ifdef TANGENTS
+in vec4 in_tangent;
+#endif
 in vec4 in_place;        // of the plant's foot; its scale
 in vec4 in_turn;         // cosine and sine of its turn about y; share kept; length of what is enlarged
 in vec3 in_shown;        // texels shown, see reveal.glsl; factor of its width; share of what has none
@@ -24,6 +27,9 @@ in vec4 in_tint;         // 0 to 255
 out vec3 position;
 out vec3 normal;
 out vec2 uv;
+#ifdef TANGENTS
+out vec4 tangent;
+#endif
 out vec4 vertex_color;
 out vec2 exposure;
 flat out float shown;
@@ -44,6 +50,9 @@ void main() {
     local.xz *= in_shown.y;
     position = in_place.w * turned_about_y(local) + in_place.xyz;
     normal = turned_about_y(in_normal_v.xyz);
+#ifdef TANGENTS
+    tangent = vec4(turned_about_y(in_tangent.xyz), in_tangent.w);
+#endif
     uv = vec2(in_position_u.w, in_normal_v.w);
 #ifdef PAINTED
     vertex_color = vec4(in_tint.rgb / 127.5, in_color.a);

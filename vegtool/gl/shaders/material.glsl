@@ -34,6 +34,17 @@ vec3 unit(vec3 v) {
 #ifdef NORMAL_MAP
 uniform sampler2D normal_map;
 uniform float normal_scale;
+#ifdef TANGENTS
+in vec4 tangent;  // w: the bitangent's sign, glTF 2.0 section 3.7.2.1
+
+// One tap: what is averaged of a normal is lost to shading either way.
+vec3 mapped_normal(vec3 normal, vec3 position, vec2 uv) {
+    vec3 along = unit(tangent.xyz - normal * dot(normal, tangent.xyz));
+    vec3 texel = texture(normal_map, uv).xyz * 2.0 - 1.0;
+    texel.xy *= normal_scale;
+    return unit(along * texel.x + tangent.w * cross(normal, along) * texel.y + normal * texel.z);
+}
+#else
 
 // The frame comes from screen derivatives (dP/du and -dP/dv, solved, so that it holds whatever way
 // up the picture lies): the reader drops tangents, and models of plants rarely carry them.
@@ -50,6 +61,7 @@ vec3 mapped_normal(vec3 normal, vec3 position, vec2 uv) {
     texel.xy *= normal_scale;
     return unit(unit(tangent) * texel.x + unit(bitangent) * texel.y + normal * texel.z);
 }
+#endif
 #endif
 
 vec3 surface_normal(vec3 normal, vec3 position, vec2 uv) {
