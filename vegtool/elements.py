@@ -6,11 +6,11 @@ photorealistic landscapes using hybrid level-of-detail approaches (2005), sectio
 reduced with distance. What is drawn is the first part of an index buffer, so that a plant of any
 number of elements costs no more than those.
 
-An element is a connected piece of few faces, as a leaf card is, or else a single face. Leaves are
-spread evenly over the plant: elements sorted along a Morton curve are taken in the order of van der
-Corput's sequence (1935), whose every first part is spread evenly along it. Wood goes by the
-area of its faces, so that twigs go first and the trunk last, and is not enlarged: enlarged faces of
-a tube are splinters.
+An element is a connected piece of few faces, as a leaf card or a twig is, or else a single face.
+Leaves are spread evenly over the plant: elements sorted along a Morton curve are taken in the order
+of van der Corput's sequence (1935), whose every first part is spread evenly along it. Wood goes by
+thickness, twigs first, slowly, and the trunk last; it is not enlarged, and no stem is left with
+holes in it: from near, both are seen at once.
 """
 
 from __future__ import annotations
@@ -23,8 +23,10 @@ from vegtool.arrays import FloatArray, IntArray, checked
 from vegtool.branches.parts import connected_parts
 from vegtool.plant import Plant
 
-MOST_FACES = 8
-"""Of an element: larger pieces are taken apart into their faces."""
+MOST_FACES = {"leaf": 8, "wood": 1024}
+"""Of an element, by role: larger pieces are taken apart into their faces."""
+WOOD_POWER = 3.0
+"""Of a share of the elements that is kept, wood keeps the share of its area to one over this."""
 MORTON_BITS = 10
 """Per axis."""
 
@@ -72,7 +74,7 @@ def ordered(plant: Plant) -> Elements:
     count = int(element.max()) + 1
     leaf = np.zeros(count, bool)
     leaf[element] = plant.face_is_leaf
-    area = np.bincount(element, plant.face_areas, count)
+    area: FloatArray = np.bincount(element, plant.face_areas, count).astype(np.float64)
     faces = np.bincount(element, minlength=count)
     middle = (
         np.stack([np.bincount(element, axis, count) for axis in plant.face_centroids.T], axis=1)
@@ -80,7 +82,7 @@ def ordered(plant: Plant) -> Elements:
     )
     rank = np.empty(count)
     rank[leaf] = spread_ranks(middle[leaf])
-    rank[~leaf] = area_ranks((area / faces)[~leaf])
+    rank[~leaf] = area_ranks((area / faces)[~leaf], area[~leaf]) ** WOOD_POWER
     order = np.lexsort((element, rank[element], plant.face_material))
     chosen = element[order]
     # elements share no vertices: a new one for every pair of element and old vertex
@@ -111,9 +113,9 @@ def spread_ranks(middle: FloatArray) -> FloatArray:
     return rank
 
 
-def area_ranks(area: FloatArray) -> FloatArray:
-    """(n,) from 0 on and below 1: the share of all area that is in larger ones."""
-    order = np.argsort(-area, kind="stable")
+def area_ranks(size: FloatArray, area: FloatArray) -> FloatArray:
+    """(n,) from 0 on and below 1: the share of all area (n,) that is in those of larger size."""
+    order = np.argsort(-size, kind="stable")
     total = np.cumsum(area[order])
     rank = np.empty(len(area))
     rank[order] = (total - area[order]) / (total[-1] if len(area) and total[-1] > 0 else 1.0)
@@ -150,7 +152,7 @@ def _elements(plant: Plant) -> np.ndarray:
     for material in np.unique(plant.face_material):
         here = np.flatnonzero(plant.face_material == material)
         part = connected_parts(local, plant.faces[here]).face_part
-        alone = np.bincount(part)[part] > MOST_FACES
+        alone = np.bincount(part)[part] > MOST_FACES[plant.materials[material].role]
         part = np.where(alone, part.max() + 1 + np.arange(len(here)), part)
         label[here] = first + np.unique(part, return_inverse=True)[1]
         first = int(label[here].max()) + 1

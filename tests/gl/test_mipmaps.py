@@ -13,6 +13,7 @@ from vegtool.gl.upload import PlantBuffers
 from vegtool.lighting.light import Light
 from vegtool.measure.views import Camera, direction
 from vegtool.plant import Material, Plant, Texture
+from vegtool.preview.reveal import interpolated
 from vegtool.srgb import linear_from_srgb, srgb_from_linear
 
 
@@ -52,6 +53,94 @@ def test_a_grey_stays_itself_through_all_levels():
     for value in (1, 60, 130, 254):
         last = list(mip_levels(np.full((256, 256, 4), value, np.uint8), True))[-1]
         np.testing.assert_array_equal(last, np.full((1, 1, 4), value))
+
+
+def leaves(size: int = 64) -> np.ndarray:
+    """Twelve discs with edges a texel wide, and an image that repeats."""
+    across = np.random.default_rng(1).random((12, 2)) * size
+    at = np.mgrid[:size, :size] + 0.5
+    away = np.abs(at[:, None] - across.T[:, :, None, None])
+    nearest = np.hypot(*np.minimum(away, size - away)).min(axis=0)
+    return np.clip(size / 9 - nearest + 0.5, 0, 1)
+
+
+def needles(size: int = 64) -> np.ndarray:
+    """Eight lines of single texels."""
+    image, rng = np.zeros((size, size)), np.random.default_rng(2)
+    for start, angle in zip(rng.random((8, 2)) * size, rng.random(8) * 6, strict=True):
+        for step in range(size // 2):
+            x, y = (start + step * np.array([np.cos(angle), np.sin(angle)])).astype(int) % size
+            image[y, x] = 1
+    return image
+
+
+def cut_out(alpha: np.ndarray) -> np.ndarray:
+    image = np.random.default_rng(3).integers(0, 256, (*alpha.shape, 4), dtype=np.uint8)
+    image[..., 3] = np.rint(255 * alpha)
+    return image
+
+
+def share_shown(alpha: np.ndarray, cutoff: float) -> float:
+    """Of the area between texels, at 64 places to a texel, that passes the test."""
+    return float((interpolated(alpha / 255.0, 8) >= cutoff).mean())
+
+
+@pytest.mark.parametrize(
+    ("alpha", "bound"),
+    [(leaves(), 0.03), (1 - leaves(), 0.03), (needles(), 0.05)],
+    ids=["leaves", "holes", "needles"],
+)
+@pytest.mark.parametrize("cutoff", [0.4, 0.5, 0.6])
+def test_with_a_cutoff_every_level_shows_as_much(alpha, bound, cutoff):
+    """Down to 8 x 8 texels, below which a texel is more than a hundredth. Plain averages lose
+    needles altogether."""
+    image = cut_out(alpha)
+    wanted = share_shown(image[..., 3], cutoff)
+    for level in [level for level in mip_levels(image, True, cutoff) if len(level) >= 8]:
+        assert share_shown(level[..., 3], cutoff) == pytest.approx(wanted, abs=bound)
+    plain = list(mip_levels(cut_out(needles()), True))
+    assert share_shown(plain[2][..., 3], cutoff) == 0
+
+
+def test_a_cutoff_changes_nothing_but_alpha_and_nothing_without_edges():
+    image = cut_out(leaves())
+    before = image.copy()
+    for plain, kept in zip(mip_levels(image, True), mip_levels(image, True, 0.5), strict=True):
+        np.testing.assert_array_equal(plain[..., :3], kept[..., :3])
+    np.testing.assert_array_equal(image, before)
+    for value in (0, 90, 255):  # nothing is shown, nor is anything; all is
+        even = cut_out(np.full((32, 32), value / 255))
+        for level in mip_levels(even, True, 0.5):
+            assert ((level[..., 3] >= 128) == (value >= 128)).all()
+
+
+@pytest.mark.parametrize("shape", [(8, 8), (5, 7), (1, 6), (12, 3)])
+@pytest.mark.parametrize("srgb", [True, False])
+def test_without_a_cutoff_levels_are_plain_averages_texel_by_texel(shape, srgb):
+    """Of odd sides too: each new texel is what lies between the old ones at its middle. To a step,
+    for what is nearly halfway between two."""
+    above = np.random.default_rng(4).integers(0, 256, (*shape, 4), dtype=np.uint8)
+    for level in mip_levels(above, srgb):
+        values = above / 255
+        if srgb:
+            values[..., :3] = linear_from_srgb(values[..., :3])
+        for row, column in np.ndindex(level.shape[:2]):
+            found = np.zeros(4)
+            for y, wy in weights(row, level.shape[0], above.shape[0]):
+                for x, wx in weights(column, level.shape[1], above.shape[1]):
+                    found += wy * wx * values[y, x]
+            if srgb:
+                found[:3] = srgb_from_linear(found[:3])
+            assert np.abs(255 * found - level[row, column]).max() <= 0.53
+        above = level
+
+
+def weights(index: int, count: int, of: int) -> list[tuple[int, float]]:
+    """Which of the texels above a new one is made of, and by how much, along an axis."""
+    middle = (index + 0.5) * of / count - 0.5
+    first = int(np.floor(middle))
+    share = middle - first
+    return [(first, 1 - share)] + ([(first + 1, share)] if share else [])
 
 
 @pytest.mark.gl

@@ -9,6 +9,7 @@ import pytest
 
 from vegtool.gl import upload
 from vegtool.gl.context import describe, framebuffer_kept
+from vegtool.gl.mipmaps import mip_levels
 from vegtool.gl.program import source
 from vegtool.gl.upload import PlantBuffers, bled_under_alpha, vertex_data
 from vegtool.plant import Material, Plant, Texture
@@ -156,3 +157,56 @@ def test_leaving_frees_what_was_made():
     assert texture.mglo is not None
     assert type(texture.mglo).__name__ == "InvalidObject"
     assert buffers.ctx.error == "GL_NO_ERROR"
+
+
+def levels_of(texture: moderngl.Texture) -> list[np.ndarray]:
+    """Its mips below the first, (h, w, 4) each."""
+    found, level = [], 0
+    while max(texture.size) >> level > 1:
+        level += 1
+        size = [max(n >> level, 1) for n in texture.size]
+        read = np.frombuffer(texture.read(level=level), np.uint8)
+        found.append(read.reshape(size[1], size[0], 4))
+    return found
+
+
+@pytest.mark.gl
+def test_coverage_is_kept_where_that_is_wanted_and_leaves_are_cut_out():
+    """At the alpha that the factor leaves of the cutoff: 0.3 of 0.6."""
+    image = np.random.default_rng(0).integers(0, 256, (16, 32, 4), dtype=np.uint8)
+    shared = Texture("t", image)
+    leaf = Material("leaf", [1, 1, 1, 0.6], shared, alpha_mode="mask", alpha_cutoff=0.3)
+    plant = squares([leaf, Material("paper", color_texture=shared, normal_texture=shared)])
+    for kept, cutoff in ((True, 0.5), (False, None)):
+        with PlantBuffers(plant, mipmaps=True, keep_coverage=kept) as buffers:
+            cut, whole = buffers.groups
+            for made, wanted in (
+                (cut.color_map, mip_levels(image, True, cutoff)),
+                (whole.color_map, mip_levels(image, True)),
+                (whole.normal_map, mip_levels(image, False)),
+            ):
+                for found, level in zip(levels_of(made), wanted, strict=True):
+                    np.testing.assert_array_equal(found, level)
+
+
+@pytest.mark.gl
+def test_bytes_of_textures_are_those_of_all_their_texels():
+    """16 x 16 and 8 x 4 texels and their mips; one that two materials share is one, and a material
+    without a texture has one white texel."""
+    shared = Texture("t", np.full((16, 16, 4), 255, np.uint8))
+    other = Texture("u", np.full((8, 4, 4), 255, np.uint8))
+    plant = squares(
+        [
+            Material("a", color_texture=shared),
+            Material("b", color_texture=shared, normal_texture=other),
+        ]
+    )
+    for mipmaps in (False, True):
+        with PlantBuffers(plant, mipmaps=mipmaps) as buffers:
+            made = [buffers.groups[1].color_map, buffers.groups[1].normal_map]
+            texels = 16 * 16 + 8 * 4
+            if mipmaps:
+                texels += sum(level[..., 0].size for one in made for level in levels_of(one))
+            assert buffers.texture_bytes == pytest.approx(4 * texels, abs=8)
+    with PlantBuffers(squares([Material("m")])) as buffers:
+        assert buffers.texture_bytes == 4

@@ -26,7 +26,7 @@ INSTANCE = np.dtype([("place", "f4", 4), ("turn", "f4", 4), ("shown", "f4", 3), 
 of the elements that is kept (WHOLE: all), length of enlarged ones. shown: texels shown, see
 reveal.glsl, a factor of the width, and the share of elements without texels that is shown. tint: 0
 to 255 for linear factors of 0 to 2."""
-WHOLE = 1 / (1 - 0.1)
+WHOLE = 1 / (1 - 0.3)
 """Share from which on all elements are whole (GROWING in instance.vert)."""
 VERTEX = (
     ("in_position_u", 4), ("in_normal_v", 4), ("in_color", 4), ("in_middle_rank", 4),

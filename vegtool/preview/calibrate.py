@@ -35,8 +35,8 @@ from vegtool.preview.library import Species
 from vegtool.preview.options import FadeMode
 from vegtool.preview.stock import STOCK
 
-AZIMUTHS = 3
-"""Views around the plant."""
+TURNS = (3, 16)
+"""From how many sides a plant is seen: few where it is large, many where few pixels show it."""
 ALONG_FADE = (0.0, 0.3, 0.6, 1.0)
 """Of a fade range: where plants are compared."""
 ROUNDS = 2
@@ -46,8 +46,14 @@ LARGEST = 1.5
 """Lengths change by no more than this factor."""
 FAR = 1e6
 """Times its distance: a plant that does not vanish."""
-LARGEST_PX = 400
-"""Pixels across of a picture: nearer plants are whole."""
+LARGEST_PX, TRUTH_PX = 400, 160
+"""Pixels across, at most, of pictures of what is drawn and of the plant itself."""
+MANY_PX = 300
+"""Pixels across of all pictures of a plant together, at least."""
+FLAT = 8.0
+"""Radii of a plant from which on perspective hardly matters."""
+CLOSEST = 1.2
+"""Radii: no nearer is it seen."""
 
 
 def distances(at: Switches, kind: int) -> FloatArray:
@@ -86,9 +92,9 @@ def corrected(
     factor = np.ones(len(at))
     with Landscape([np.zeros((8, 8), np.uint8)], ctx=landscape.ctx) as truth:
         truth.add(species.levels[0], elements, mipmaps=False)
+        wanted = _wanted(truth, kinds, kind, at, focal_px)
         for i, distance in enumerate(at):
-            views = [_view(kinds, kind, float(distance), a, focal_px) for a in range(AZIMUTHS)]
-            wanted = sum(_covered(truth, _whole(view[2]), view, SUPERSAMPLE, 0) for view in views)
+            views = _views(kinds, kind, float(distance), focal_px, LARGEST_PX)
             factor[i] = factor[i - 1] if i else 1.0
             for _ in range(ROUNDS):
                 only = np.zeros(1), np.full(1, factor[i])
@@ -97,19 +103,55 @@ def corrected(
                 for view in views:
                     what = chosen(view[2], tried, 1.0, fade)
                     drawn += _covered(landscape, frame(view[2], what), view, 1, MSAA)
-                ratio = wanted / drawn if drawn > 0 and wanted > 0 else 1.0
+                drawn /= len(views)
+                ratio = wanted[i] / drawn if drawn > 0 and wanted[i] > 0 else 1.0
                 factor[i] = np.clip(factor[i] * ratio**0.5, 1 / LARGEST, LARGEST)
             yield (i + 1) / len(at), (stage, factor)
 
 
-def _view(kinds: Kinds, kind: int, distance: float, azimuth: int, focal_px: float) -> View:
+def _wanted(
+    truth: Landscape, kinds: Kinds, kind: int, at: FloatArray, focal_px: float
+) -> FloatArray:
+    """(k,) steradians, nearly, that the plant itself covers from distances (k,), the mean of all
+    views."""
+
+    def covered(distance: float) -> float:
+        views = _views(kinds, kind, distance, focal_px, TRUTH_PX)
+        areas = [_covered(truth, _whole(view[2]), view, SUPERSAMPLE, 0) for view in views]
+        return sum(areas) / len(areas)
+
+    radius = float(kinds.radius[kind])
+    near, far = FLAT * radius, FLAT**2 * radius
+    found = np.array([covered(float(d)) if d < near else 0.0 for d in at])
+    if (at >= near).any():
+        # from afar a plant covers a / d^2 + b / d^4: what perspective does to it fades
+        areas = [covered(d) * d**2 for d in (near, far)]
+        bent = (areas[0] - areas[1]) / (near**-2.0 - far**-2.0)
+        flat = areas[1] - bent * far**-2.0
+        found = np.where(at >= near, (flat + bent / at**2) / at**2, found)
+    return found
+
+
+def _views(kinds: Kinds, kind: int, distance: float, focal_px: float, most: int) -> list[View]:
+    """A plant that far away, from all around; most: pixels of a picture."""
+    pixels = 2 * float(kinds.radius[kind]) * focal_px / max(distance, 1e-9)
+    count = int(np.clip(np.ceil(MANY_PX / max(pixels, 1e-9)), *TURNS))
+    turns = 2 * np.pi * np.arange(count) / count
+    return [_view(kinds, kind, distance, float(turn), focal_px, most) for turn in turns]
+
+
+def _view(
+    kinds: Kinds, kind: int, distance: float, turn: float, focal_px: float, most: int
+) -> View:
+    """What is seen of a plant that far away and turned so; most: pixels of the picture."""
     middle, radius = float(kinds.center[kind]), float(kinds.radius[kind])
-    away = max(distance, 1.2 * radius)
-    pixels = min(ceil(2.3 * radius * focal_px / away) + 4, LARGEST_PX)
-    fov = degrees(2 * atan(pixels / 2 / focal_px))
+    away = max(distance, CLOSEST * radius)
+    pixels = ceil(2 * radius * focal_px / (away**2 - radius**2) ** 0.5) + 4
+    focal = focal_px * min(most / pixels, 1.0)
+    pixels = min(pixels, most)
+    fov = degrees(2 * atan(pixels / 2 / focal))
     eye = Eye(np.array([0.0, middle, away]), fov_y_deg=fov, near_m=away / 100, far_m=away * 10)
     rows = np.zeros(1, STOCK)
-    turn = 2 * np.pi * azimuth / AZIMUTHS
     rows["scale"], rows["vanish"], rows["species"] = 1.0, FAR, kind
     rows["turn"], rows["tint"] = (np.cos(turn), np.sin(turn)), 255
     place = np.array([[0.0, -middle, -away]], np.float32)
@@ -131,8 +173,7 @@ def _whole(seen: Seen) -> Frame:
 def _covered(
     landscape: Landscape, what: Frame, view: View, supersample: int, samples: int
 ) -> float:
-    """Pixels that a plant covers."""
+    """Of the picture plane at a distance of 1: area that a plant covers."""
     eye, size, _ = view
-    shot = eye.shot(*size)
-    drawn = picture(landscape, what, shot, Light(), supersample, samples, ground=False)
-    return float(drawn[..., 3].sum())
+    drawn = picture(landscape, what, eye.shot(*size), Light(), supersample, samples, ground=False)
+    return float(drawn[..., 3].sum()) / eye.focal_px(size[1]) ** 2

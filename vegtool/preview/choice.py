@@ -67,10 +67,10 @@ class Kinds:
 
     switch_m: (s, l) metres at which each level may be used, of plants of scale 1; infinite where
     there is none. room_m: (s, l) metres at which there is room for no more triangles than it has.
-    fade: (s, l). model: (s, l) int32, index in the landscape. triangles: (s, l). count: (s,) levels. opaque: (s,
-    l) bool, fades by elements; else by texels. center: (s,) metres above the foot, and radius:
-    (s,), of what a plant fills. thinned_m: (s,), up to which all plants are drawn. corrections: of
-    each kind.
+    fade: (s, l). model: (s, l) int32, index in the landscape. triangles: (s, l). count: (s,)
+    levels. opaque: (s, l) bool, fades by elements; else by texels. center: (s,) metres above the
+    foot, and radius: (s,), of what a plant fills. thinned_m: (s,), up to which all plants are
+    drawn. corrections: of each kind.
     """
 
     switch_m: FloatArray
@@ -215,12 +215,13 @@ def seen(
         places.append(stock.rows["offset"][:count] + (stock.origin - eye).astype(np.float32))
     rows, place = np.concatenate(parts), np.concatenate(places)
     kind, scale = rows["species"], rows["scale"]
-    middle = place.copy()
-    middle[:, 1] += scale * kinds.center.astype(np.float32)[kind]
-    distance = np.sqrt(np.einsum("ij,ij->i", middle, middle))
-    radius = scale * kinds.radius.astype(np.float32)[kind]
-    normals, offsets = planes[:, :3].astype(np.float32), planes[:, 3].astype(np.float32)
-    inside = (middle @ normals.T + offsets).min(axis=1, initial=np.inf) > -radius
+    x, y, z = place.T.copy()
+    y += scale * kinds.center.astype(np.float32)[kind]
+    distance = np.sqrt(x * x + y * y + z * z)
+    within = -scale * kinds.radius.astype(np.float32)[kind]
+    inside = np.ones(len(rows), bool)
+    for a, b, c, d in planes.astype(np.float32):
+        inside &= a * x + b * y + c * z + d > within
     vanish = scale * rows["vanish"] * (detail * kinds.thinned_m).astype(np.float32)[kind]
     keep = np.flatnonzero(inside & (distance < vanish))
     distance = np.maximum(distance[keep], np.float32(1e-3))

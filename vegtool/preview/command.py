@@ -4,15 +4,34 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Protocol
 
-from vegtool.errors import UsageError
+from vegtool.errors import OutputError, UsageError
 from vegtool.formats import ReadOptions
 from vegtool.formats.atomic import FileSet, check_free
 from vegtool.preview.options import PreviewOptions
 from vegtool.progress import Progress
+
+if TYPE_CHECKING:
+    from vegtool.preview.path import CameraPath
+    from vegtool.preview.world import World
+    from vegtool.scene import Scene
+
+READING = 0.2
+"""Of the progress of what is written: reading files."""
+
+Bar = Callable[[str], AbstractContextManager[Progress]]
+"""What shows progress, under a title, as long as it is open."""
+
+
+class Say(Protocol):
+    """Says a sentence to the user, who wants to hear what is important `at` least."""
+
+    def __call__(self, text: str, at: int = 0) -> None:
+        """at: 0 for all, 1 for those who asked for more."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +48,11 @@ class Wanted:
     html: Path | None = None
     force: bool = False
 
+    @property
+    def window(self) -> bool:
+        """Whether it is a window that is wanted."""
+        return all(one is None for one in (self.out, self.screenshot, self.frames, self.html))
+
 
 @dataclass(frozen=True)
 class Result:
@@ -39,46 +63,124 @@ class Result:
 
 
 def run_preview(
-    wanted: Wanted,
-    options: PreviewOptions,
-    read: ReadOptions,
-    progress: Progress,
-    say: Callable[[str], None],
+    wanted: Wanted, options: PreviewOptions, read: ReadOptions, bar: Bar, say: Say
 ) -> Result:
     """Show or write what is wanted.
 
     Raises UsageError for what contradicts each other, InputError for what is missing or broken,
     OutputError where nothing can be written, CapabilityError where nothing can be drawn or shown.
     """
-    _check(wanted)
+    _check(wanted, options, read)
     if wanted.html is not None:
-        return _write_page(wanted)
-    from vegtool.preview.world import read_world
+        with bar("preview"):
+            return _write_page(wanted)
+    from vegtool.preview.world import parts_of, read_world, way_of
 
-    world = read_world(wanted.path, wanted.scene, read, progress)
-    for note in world.notes:
-        say(note)
-    from vegtool.preview.drawn import drawn_without_window, shown_in_window
+    folder, file = parts_of(wanted.path, wanted.scene)
+    scene, way = None, wanted.camera
+    if file is not None:
+        from vegtool.scene import read_scene
 
-    if wanted.screenshot or wanted.frames or wanted.out:
-        return drawn_without_window(wanted, world, options, progress)
-    return shown_in_window(wanted, world, options, say)
+        scene = read_scene(file)
+        way = way or way_of(scene)
+    path = None
+    if way is not None:
+        from vegtool.preview.path import read_path
+
+        path = read_path(way)
+    _check_written(wanted, path, _inputs(wanted, scene, way))
+    if wanted.window:
+        from vegtool.gl.window import check_display
+
+        check_display()
+    with bar("preview") as progress:
+        world = read_world(folder, file, read, part(progress, 0.0, READING))
+        _tell(world, options, say)
+        from vegtool.preview.drawn import drawn_without_window, shown_in_window
+
+        if not wanted.window:
+            drawn = part(progress, READING, 1.0)
+            result = drawn_without_window(wanted, world, path, options, drawn)
+    if wanted.window:
+        result = shown_in_window(wanted.path, world, path, options, say)
+    return Result({**result.facts, "notes": list(world.notes)}, result.text)
 
 
-def _check(wanted: Wanted) -> None:
-    if wanted.out is not None and wanted.camera is None:
-        raise UsageError("--out: writes a walk; add the way, --path PATH.toml")
+def part(progress: Progress, start: float, end: float) -> Progress:
+    """Progress of what is a part of something else."""
+    return lambda stage, fraction: progress(stage, start + (end - start) * fraction)
+
+
+def as_json(values: Any) -> bytes:
+    """Figures as the bytes of a file."""
+    return (json.dumps(values, indent=2, allow_nan=False) + "\n").encode()
+
+
+def _check(wanted: Wanted, options: PreviewOptions, read: ReadOptions) -> None:
+    """Raise UsageError for what contradicts each other, whatever is in the files."""
     if wanted.stats is not None and wanted.frames is None:
         raise UsageError("--stats: writes what frames took; add how many, --frames N")
     others = (wanted.scene, wanted.camera, wanted.out, wanted.screenshot, wanted.frames)
-    if wanted.html is not None and any(other is not None for other in others):
-        raise UsageError("--html: shows converted plants by themselves; leave out the rest")
-    for file, ending in ((wanted.screenshot, ".png"), (wanted.html, ".html")):
+    plain = options == PreviewOptions() and read == ReadOptions()
+    if wanted.html is not None and not (plain and all(other is None for other in others)):
+        raise UsageError(
+            "--html: writes a page that shows converted plants by themselves; leave out all else "
+            "but the folder and -f"
+        )
+    for file, ending in (
+        (wanted.screenshot, ".png"), (wanted.stats, ".json"), (wanted.html, ".html"),
+    ):  # fmt: skip
         if file is not None and file.suffix.lower() != ending:
             raise UsageError(f"{file}: expected a name that ends in {ending}")
-    for file in (wanted.screenshot, wanted.stats, wanted.html):
         if file is not None:
             check_free(file.parent, [file.name], wanted.force)
+
+
+def _check_written(wanted: Wanted, path: CameraPath | None, inputs: list[Path]) -> None:
+    """Raise UsageError, OutputError and CapabilityError where something may not be written."""
+    if wanted.out is not None:
+        if path is None:
+            raise UsageError("--out: writes a walk; add the way, --path PATH.toml")
+        from vegtool.preview.movie import check_output
+
+        check_output(wanted.out, path.fps, wanted.force)
+    for file in (wanted.screenshot, wanted.stats):
+        if file is not None and file.exists() and any(_same(file, one) for one in inputs):
+            raise OutputError(
+                f"{file}: is read by this command, and never overwritten. Name another file."
+            )
+
+
+def _inputs(wanted: Wanted, scene: Scene | None, way: Path | None) -> list[Path]:
+    """The files that are read, as far as they are named."""
+    named = [wanted.path, wanted.scene, way]
+    if scene is not None:
+        texts = [scene.terrain.heightmap, scene.placement.inventory]
+        texts += [text for one in scene.species for text in (one.model, one.density)]
+        named += [scene.path.parent / text for text in texts if text is not None]
+    if wanted.path.is_dir():
+        named += wanted.path.glob("*.lod.json")
+    return [file for file in named if file is not None and file.is_file()]
+
+
+def _same(file: Path, other: Path) -> bool:
+    try:
+        return file.samefile(other)
+    except OSError:
+        return False
+
+
+def _tell(world: World, options: PreviewOptions, say: Say) -> None:
+    """What was guessed or left out; and, to those who ask, what each species' levels are."""
+    for note in world.notes:
+        say(note)
+    focal = world.start.focal_px(options.pixels[1])
+    for one in world.species:
+        levels = [
+            f"{len(level.faces):,} triangles" + (f" from {away:.3g} m" if away else "")
+            for level, away in zip(one.levels, one.switch_m * focal / one.focal_px, strict=True)
+        ]
+        say(f"{one.name}: {', '.join(levels)} ({one.files[0]})", at=1)
 
 
 def _write_page(wanted: Wanted) -> Result:
@@ -88,10 +190,5 @@ def _write_page(wanted: Wanted) -> Result:
     page = web_page(wanted.path)
     with FileSet(wanted.html.parent, wanted.force) as files:
         files.add(wanted.html.name, page)
-    facts = {"file": str(wanted.html), "bytes": len(page)}
+    facts = {"page": str(wanted.html), "bytes": len(page)}
     return Result(facts, f"{wanted.html}: {len(page) / 1e6:.1f} MB")
-
-
-def as_json(values: Any) -> bytes:
-    """Figures as the bytes of a file."""
-    return (json.dumps(values, indent=2, allow_nan=False) + "\n").encode()

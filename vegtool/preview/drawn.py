@@ -16,7 +16,7 @@ from vegtool.preview.options import FadeMode, PreviewOptions
 from vegtool.preview.path import CameraPath, eyes, read_path
 from vegtool.preview.run import frames, loaded, summary, timed_frames
 from vegtool.preview.show import Show
-from vegtool.preview.state import State
+from vegtool.preview.state import FIRST_DETAIL, LEAST_DETAIL, State
 from vegtool.preview.world import Row, World
 from vegtool.progress import Progress
 
@@ -32,7 +32,9 @@ def show_of(world: World, options: PreviewOptions) -> Show:
     else:
         camera = Fly(world.start, ground=world.height_at)
     sun = None if options.sun is None else Sun.read(options.sun)
-    governor = None if not options.fps else Governor(1e3 / options.fps)
+    governor = (
+        None if not options.fps else Governor(1e3 / options.fps, LEAST_DETAIL, detail=FIRST_DETAIL)
+    )
     state = State(camera, world.target, sun=sun, governor=governor)
     return Show(world, state, cast(FadeMode, options.fade))
 

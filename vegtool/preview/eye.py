@@ -109,6 +109,10 @@ class Eye:
             planes[5] = *back, self.far_m
         return planes
 
+    def focal_px(self, height_px: int) -> float:
+        """Pixels that one metre at a distance of one metre covers in a picture of that height."""
+        return Display(self.fov_y_deg, height_px).pixels_per_metre(1.0)
+
     def pixels_per_metre(self, distance_m: float, height_px: int) -> float:
         """Pixels that one metre covers in the middle of a picture of that height, that far away;
         nearer than `near_m`, as many as there."""

@@ -45,8 +45,6 @@ MOST_PLANTS = 2_000_000
 """Plants that are kept: 90 MB."""
 IN_FULL = 1e9
 """Detail at which every plant is its original, whole."""
-LARGEST_PLANT = 2.0
-"""Times the size of its model."""
 CALIBRATED_PX = 665.1
 """Pixels of a metre at a distance of one metre in pictures of 1024 x 768 and 60 degrees, for which
 lengths are corrected: distances in pixels are what matters."""
@@ -83,8 +81,8 @@ class FrameStats:
 class Forest(OnGpu):
     """Species, where they stand, and the ground, on the GPU. A context manager: leaving releases.
 
-    Making one does nothing: `load` does, a bit at a time. sharp: without mips, for pictures that are
-    supersampled, as of plants in full.
+    Making one does nothing: `load` does, a bit at a time. sharp: without mips, for pictures that
+    are supersampled, as of plants in full.
     """
 
     def __init__(
@@ -99,6 +97,9 @@ class Forest(OnGpu):
         self.species, self.placement = tuple(species), placement
         self.ground, self.fade, self.sharp = ground, fade, sharp
         self.total = int(placement.tiles.count.sum())
+        own = np.array([one.height for one in species])
+        tallest = placement.tallest(len(species))
+        self._largest: FloatArray = np.where(np.isnan(tallest), 1.0, tallest / own)
         self._landscape: Landscape | None = None
         self._elements: list[list[Elements]] = []
         self._models: list[list[int]] = []
@@ -181,7 +182,7 @@ class Forest(OnGpu):
         supersample: int = 1,
         samples: int = MSAA,
     ) -> Picture:
-        """What `draw` draws, as light and coverage, the ground included: see gl.landscape.picture."""
+        """What `draw` draws, as light and coverage, the ground too: see gl.landscape.picture."""
         landscape = self._landscape
         if landscape is None:
             raise ValueError("Forest.picture: load it first")
@@ -193,7 +194,7 @@ class Forest(OnGpu):
         self, eye: Eye, size: tuple[int, int], look: Look
     ) -> tuple[Seen, Chosen, np.ndarray]:
         """The plants that are seen, the levels to draw, and the tiles in which they stand."""
-        kinds = self._kinds_for(eye.pixels_per_metre(1.0, size[1]))
+        kinds = self._kinds_for(eye.focal_px(size[1]))
         planes = eye.planes(*size)
         tiles, near = self._tiles_seen(eye, planes, kinds)
         stocks = [self._stock(int(tile), kinds) for tile in tiles]
@@ -219,7 +220,7 @@ class Forest(OnGpu):
     ) -> tuple[np.ndarray, FloatArray]:
         """The tiles whose plants may be in view, nearest first, and how near they are."""
         tiles = self.placement.tiles
-        margin = LARGEST_PLANT * float((kinds.radius + np.abs(kinds.center)).max())
+        margin = float((self._largest * (kinds.radius + np.abs(kinds.center))).max())
         low, high = tiles.low - eye.position - margin, tiles.high - eye.position + margin
         near = np.linalg.norm(np.clip(0.0, low, high), axis=1)
         middle, half = (low + high) / 2, (high - low) / 2

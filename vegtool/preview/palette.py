@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-PALETTE = np.array(
+from vegtool.srgb import linear_from_srgb
+
+_SRGB = np.array(
     [
         [230, 230, 230, 255], [204, 60, 40, 255], [222, 160, 24, 255], [60, 150, 60, 255],
         [50, 110, 200, 255], [140, 70, 170, 255], [40, 160, 160, 255], [200, 90, 140, 255],
@@ -12,4 +14,7 @@ PALETTE = np.array(
     ],
     np.uint8,
 )  # fmt: skip
-"""(10, 4) tints: linear, halved, as gl.instances.INSTANCE has them."""
+PALETTE = np.concatenate(
+    [np.rint(127.5 * linear_from_srgb(_SRGB[:, :3] / 255)), _SRGB[:, 3:]], axis=1
+).astype(np.uint8)
+"""(10, 4) tints, as gl.instances.INSTANCE has them."""

@@ -20,7 +20,7 @@ from vegtool.tiles.placement import Plants
 STOCK = np.dtype(
     [
         ("offset", "f4", 3), ("scale", "f4"), ("turn", "f4", 2), ("vanish", "f4"),
-        ("species", "u2"), ("tint", "u1", 4),
+        ("species", "u4"), ("tint", "u1", 4),
     ]
 )  # fmt: skip
 """offset: metres from the tile's origin to the foot. scale: of the model. turn: cosine and sine of

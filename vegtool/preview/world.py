@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from math import radians, tan
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from vegtool.arrays import FloatArray
 from vegtool.errors import InputError, UsageError
 from vegtool.formats import ReadOptions
 from vegtool.gl.landscape import GroundMesh
+from vegtool.lighting.light import Sun
 from vegtool.preview.eye import FOV_Y_DEG, Eye, towards
 from vegtool.preview.library import MANIFEST, Species, read_library
 from vegtool.progress import Progress, silent
@@ -23,16 +25,33 @@ SPACE = 1.25
 """Between plants in a row, in widths of theirs."""
 CELLS = 256
 """Squares along the longer side of the ground that is drawn."""
+TILE_M = 32.0
+"""Side of a tile: plants outside of the view are left out a tile at a time."""
 EYE_M = 1.7
 """Height of a walker's eye above the ground."""
-AROUND = 6.0
-"""Of plants in a row, sizes of the ground around them."""
+AROUND = 60.0
+"""Of plants in a row, sizes of the ground around them: its edge is hardly told from a horizon."""
+FILLED = 0.85
+"""Of the picture, by what is looked at as a whole: a row, or a stand."""
+ROOTED = 0.1
+"""Of its height, how far from its file's origin the lowest point of a plant is that stands."""
+ASPECT = 4 / 3
+"""Of pictures that the eye's first place is chosen for."""
+STAND_M = 60.0
+"""A landscape of less is looked at from outside."""
+MARGIN_M = 100.0
+"""Around plants, where nobody says how far the ground goes."""
+CLEAR_M = 6.0
+"""Between the eye's first place, with what is before it, and the nearest crown: enough."""
+SEARCHED_M = 24.0
+"""Around the wanted place, where a clear one is looked for, a step of CLEAR_M / 3 at a time."""
 
 
 @dataclass(frozen=True, eq=False)
 class World:
     """species: those that the placement counts through. target: (3,) metres, what is orbited about.
-    notes: sentences for the user."""
+    sun: of the scene, or None. way: the file of the scene's camera path, or None. notes: sentences
+    for the user."""
 
     species: tuple[Species, ...]
     placement: Placement
@@ -40,6 +59,8 @@ class World:
     ground: GroundMesh | None
     start: Eye
     target: FloatArray
+    sun: Sun | None = None
+    way: Path | None = None
     notes: tuple[str, ...] = ()
 
     def height_at(self, x: float, z: float) -> float:
@@ -49,28 +70,52 @@ class World:
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """A plant of each species, side by side along x: a placement of one tile."""
+    """A plant of each species, side by side: a placement of one tile. foot: (n, 3) metres."""
 
-    x: FloatArray
+    foot: FloatArray
     tile_m: float
     origin: FloatArray = field(default_factory=lambda: np.zeros(3))
     notes: tuple[str, ...] = ()
 
     @property
     def tiles(self) -> Tiles:
-        low = np.array([[self.x.min(), 0.0, 0.0]])
-        high = np.array([[self.x.max(), 0.0, 0.0]])
-        return Tiles(low, high, np.array([len(self.x)]))
+        low, high = self.foot.min(axis=0), self.foot.max(axis=0)
+        return Tiles(low[None], high[None], np.array([len(self.foot)]))
+
+    def tallest(self, count: int) -> FloatArray:
+        """(count,) metres that no plant of each species is taller than; NaN: the model's own."""
+        return np.full(count, np.nan)
 
     def plants(self, tile: int, most: int | None = None) -> Plants:
-        count = len(self.x)
-        offset = np.zeros((count, 3), np.float32)
-        offset[:, 0] = self.x
+        count, origin = len(self.foot), self.foot.mean(axis=0)
+        offset = (self.foot - origin).astype(np.float32)
         return Plants(
-            np.zeros(3), offset, np.arange(count, dtype=np.int32), np.zeros(count, np.float32),
+            origin, offset, np.arange(count, dtype=np.int32), np.zeros(count, np.float32),
             np.full(count, np.nan, np.float32), np.ones((count, 3), np.float32),
             np.arange(1, count + 1),
         )  # fmt: skip
+
+
+def parts_of(path: Path, scene: Path | None) -> tuple[Path, Path | None]:
+    """Where the plants are, and the scene file, if any. Raises UsageError, InputError."""
+    if path.suffix.lower() == ".toml":
+        if scene is not None:
+            raise UsageError(
+                f"--scene: expected plants, and a scene for them; got two scenes, {path} and "
+                f"{scene}; leave out one of the two"
+            )
+        return path.parent, path
+    if scene is not None and not path.is_dir() and not path.name.endswith(MANIFEST):
+        if not path.exists():
+            raise InputError(
+                f"{path}: expected a folder of converted plants for --scene, found nothing there. "
+                "Check the path."
+            )
+        raise UsageError(
+            f"{path}: expected a folder of converted plants beside --scene; got a file. Name the "
+            "folder that holds the species' plants; a species' own file is its model = in the scene"
+        )
+    return path, scene
 
 
 def read_world(
@@ -81,77 +126,204 @@ def read_world(
 
     Raises InputError and UsageError for what is missing or broken.
     """
-    if scene is None and path.suffix.lower() == ".toml":
-        path, scene = path.parent, path
-    if scene is None:
-        return _row(read_library(path, read, progress))
-    return _landscape(path, read_scene(scene), read, progress)
+    path, scene = parts_of(path, scene)
+    if scene is not None:
+        return _landscape(path, read_scene(scene), read, progress)
+    if path.is_dir() or path.name.endswith(MANIFEST):
+        _check_reading(read, path)
+    return _row(read_library(path, read, progress))
+
+
+def _check_reading(read: ReadOptions, path: Path) -> None:
+    if read != ReadOptions():
+        raise UsageError(
+            f"--unit, --up and --leaf-material say how a model is read; {path} is converted "
+            "already, in metres and y up. Leave them out"
+        )
 
 
 def _row(species: Sequence[Species]) -> World:
-    widths = np.array([np.ptp(one.levels[0].bounds[:, [0, 2]], axis=0).max() for one in species])
+    low, high = (np.array([one.levels[0].bounds[i] for one in species]) for i in (0, 1))
+    middle, widths = (low + high) / 2, np.ptp([low, high], axis=0)[:, [0, 2]].max(axis=1)
     ends = np.cumsum(SPACE * widths)
-    x = ends - SPACE * widths / 2
-    x = x - (x[0] + x[-1]) / 2 if len(x) > 1 else np.zeros(1)
-    heights = [one.levels[0].bounds[:, 1] for one in species]
-    low, high = min(h[0] for h in heights), max(h[1] for h in heights)
-    size = max(float(ends[-1]), high - low)
-    target = np.array([0.0, (low + high) / 2, 0.0])
-    eye = target + np.array([0.25, 0.12, 1.1]) * size
+    foot = -middle  # a plant may be anywhere in its file
+    foot[:, 0] += ends - SPACE * widths / 2 - ends[-1] / 2
+    rooted = np.abs(low[:, 1]) < ROOTED * (high - low)[:, 1]
+    foot[:, 1] = np.where(rooted, 0.0, -low[:, 1])
+    top = float((high[:, 1] + foot[:, 1]).max())
+    size = max(float(ends[-1]), top, 1e-6)
+    target = np.array([0.0, top / 2, 0.0])
+    depth = float((high - low)[:, 2].max())
+    away = _fitting(float(ends[-1]), top, FOV_Y_DEG) + depth / 2
+    aside = np.array([0.22, 0.11, 0.97])  # of unit length
+    eye = target + aside * away
     yaw, pitch = towards(target - eye)
     near = min(0.1, size / 100)
-    terrain = Terrain("plane", extent=np.full(2, AROUND * size), base=min(float(low), 0.0))
+    terrain = Terrain("plane", extent=np.full(2, AROUND * size))
     start = Eye(eye, yaw, pitch, FOV_Y_DEG, near_m=near)
     return World(
-        tuple(species), Row(x, float(ends[-1])), terrain, _ground(terrain, 1), start, target
+        tuple(species), Row(foot, float(ends[-1])), terrain, _ground(terrain, 1), start, target
     )  # fmt: skip
+
+
+def _fitting(width: float, height: float, fov_y_deg: float) -> float:
+    """Metres from which so much fills FILLED of a picture."""
+    up = tan(radians(fov_y_deg) / 2) * FILLED
+    return max(height / 2 / up, width / 2 / (up * ASPECT))
 
 
 def _landscape(path: Path, scene: Scene, read: ReadOptions, progress: Progress) -> World:
     terrain = terrain_of(scene)
-    placement = placement_of(scene, terrain, progress=lambda s, f: progress(s, f / 2))
-    species = []
-    for index, table in enumerate(scene.species):
-        species.append(_species_of(path, scene, index, read))
-        progress(f"plants: {table.name or table.model}", (1 + (index + 1) / len(scene.species)) / 2)
+    placement = placement_of(scene, terrain, TILE_M, lambda s, f: progress(s, f / 2))
+    sources = [_source_of(path, scene, index) for index in range(len(scene.species))]
+    if all(source.name.endswith(MANIFEST) for source in sources):
+        _check_reading(read, path)
+    species: list[Species] = []
+    notes = [*terrain.notes, *placement.notes]
+    for source, table in zip(sources, scene.species, strict=True):
+        progress(f"plants: {table.name or source.name}", (1 + len(species) / len(sources)) / 2)
+        (one,) = read_library(source, read)
+        species.append(one)
+        notes += _notes_on(one, source)
     tiles = placement.tiles
+    if not len(tiles):
+        raise UsageError(
+            f"{scene.path}: expected plants, found none that stands on the ground of the scene. "
+            "Check [placement], and where [[species]] may grow"
+        )
+    start, target = _start(scene, terrain, placement, species)
     low, high = tiles.low.min(axis=0), tiles.high.max(axis=0)
-    middle = (low + high) / 2
-    xz = np.array([[middle[0], middle[2] + 0.4 * (high - low)[2]]])
-    height = float(terrain.height(xz)[0])
-    eye = np.array([xz[0, 0], height + EYE_M, xz[0, 1]])
-    fov = scene.camera.fov_y_deg or FOV_Y_DEG
-    extent = np.maximum(2 * np.maximum(np.abs(low), np.abs(high))[[0, 2]], 1.0)
+    reach = 2 * np.maximum(np.abs(low), np.abs(high))[[0, 2]] + 2 * MARGIN_M
+    extent = reach if terrain.extent is None else terrain.extent
     ground = None if terrain.kind == "none" else _ground(terrain, CELLS, extent)
-    notes = (*terrain.notes, *placement.notes)
-    target = np.array([middle[0], float(terrain.height(middle[None, [0, 2]])[0]), middle[2]])
-    return World(tuple(species), placement, terrain, ground, Eye(eye, fov_y_deg=fov), target, notes)
+    sun = None if scene.light is None else scene.light.sun
+    return World(
+        tuple(species), placement, terrain, ground, start, target, sun, way_of(scene), tuple(notes)
+    )
 
 
-def _species_of(path: Path, scene: Scene, index: int, read: ReadOptions) -> Species:
-    """The species of a table: its model, or what was converted under its name."""
+def way_of(scene: Scene) -> Path | None:
+    """The file of a scene's camera path."""
+    return None if scene.camera.path is None else scene.path.parent / scene.camera.path
+
+
+def _source_of(path: Path, scene: Scene, index: int) -> Path:
+    """The file of a table's species: what was converted under its name or its model's, else its
+    model."""
     table = scene.species[index]
-    if table.model is not None:
-        place = scene.path.parent / table.model
-        found = read_library(place, read)
-        if len(found) == 1:
-            return found[0]
-        named = [one for one in found if one.name == table.name]
-        if len(named) != 1:
-            names = ", ".join(one.name for one in found)
-            raise UsageError(
-                f"{scene.at('species', index, 'model')}: {place} holds {len(found)} plants "
-                f"({names}); name one's manifest, NAME{MANIFEST}"
-            )
-        return named[0]
     folder = path if path.is_dir() else path.parent
-    manifest = folder / f"{table.name}{MANIFEST}"
-    if table.name is None or not manifest.exists():
+    place = None if table.model is None else scene.path.parent / table.model
+    if place is not None and place.name.endswith(MANIFEST):
+        return place
+    if place is not None and place.is_dir():
+        return _manifest_in(place, scene, index)
+    names = [table.name, None if place is None else place.stem]
+    converted = [folder / f"{name}{MANIFEST}" for name in names if name is not None]
+    for manifest in converted:
+        if manifest.exists():
+            return manifest
+    if place is None:
+        wanted = converted[0] if converted else folder / f"NAME{MANIFEST}"
         raise InputError(
             f"{scene.at('species', index)}: expected a model, or a plant converted under the name "
-            f"of the species, {manifest}; found none. Convert it, or say model = ..."
+            f"of the species, {wanted}; found none. Convert it, or say model = ..."
         )
-    return read_library(manifest, read)[0]
+    if not place.exists():
+        raise InputError(
+            f"{scene.at('species', index, 'model')}: expected the model {place}, or the plant "
+            f"converted, {converted[0]}; found neither. Check the names"
+        )
+    return place
+
+
+def _manifest_in(place: Path, scene: Scene, index: int) -> Path:
+    """The manifest of a species in a folder that the scene names."""
+    found = sorted(place.glob(f"*{MANIFEST}"))
+    named = [one for one in found if one.name == f"{scene.species[index].name}{MANIFEST}"]
+    if len(named or found) != 1:
+        names = ", ".join(one.name for one in found) or "no manifest"
+        raise UsageError(
+            f"{scene.at('species', index, 'model')}: expected one plant in {place}, or one of the "
+            f"species' name; found {names}. Name a manifest, NAME{MANIFEST}"
+        )
+    return (named or found)[0]
+
+
+def _notes_on(one: Species, source: Path) -> list[str]:
+    """What is to be known of a plant that is to stand in a landscape."""
+    notes = []
+    if not source.name.endswith(MANIFEST):
+        notes.append(f"{source}: has no levels of detail; vegtool convert makes them")
+    low, high = one.levels[0].bounds
+    beside = float(np.abs((low + high) / 2)[[0, 2]].max())
+    if beside > 1.5 * float((high - low).max()):
+        notes.append(
+            f"{source}: stands {beside:.4g} m beside the origin of its file, and so of where it is "
+            "placed; move it there"
+        )
+    if high[1] <= 0:
+        raise InputError(
+            f"{source}: expected a plant that stands on the origin of its file, found one all of "
+            f"which is below it, by {-high[1]:.4g} m at least; move it up"
+        )
+    return notes
+
+
+def _start(
+    scene: Scene, terrain: Terrain, placement: Placement, species: Sequence[Species]
+) -> tuple[Eye, FloatArray]:
+    """The first eye, and what is orbited about: within a wood, or outside of a stand."""
+    tiles, camera = placement.tiles, scene.camera
+    low, high = tiles.low.min(axis=0), tiles.high.max(axis=0)
+    middle, size = (low + high) / 2, high - low
+    fov = camera.fov_y_deg or FOV_Y_DEG
+    own = np.array([one.height for one in species])
+    tall = placement.tallest(len(species))
+    tallest = float(np.where(np.isfinite(tall), tall, own).max())
+    middle[1] = float(terrain.height(middle[None, [0, 2]])[0])
+    if max(size[0], size[2]) < STAND_M:
+        away = _fitting(size[0] + tallest, tallest, fov)
+        xz = np.array([middle[0], high[2] + tallest / 2 + away])
+    else:
+        xz = np.array([middle[0], middle[2] + 0.4 * size[2]])
+        xz = _clear(placement, species, xz)
+    above = EYE_M if camera.height_m is None else float(np.mean(camera.height_m))
+    eye = np.array([xz[0], float(terrain.height(xz[None])[0]) + above, xz[1]])
+    if terrain.kind == "none":
+        eye[1] += low[1]
+    pitch = 0.0
+    if max(size[0], size[2]) < STAND_M:
+        _, pitch = towards(middle + np.array([0.0, tallest / 2, 0.0]) - eye)
+    return Eye(eye, 0.0, pitch, fov), middle
+
+
+def _clear(placement: Placement, species: Sequence[Species], xz: FloatArray) -> FloatArray:
+    """(2,) a place near another that no crown reaches, nor one a few metres ahead."""
+    tiles = placement.tiles
+    reach = SEARCHED_M + 2 * CLEAR_M
+    apart = np.maximum(tiles.low[:, [0, 2]] - xz, xz - tiles.high[:, [0, 2]]).max(axis=1)
+    own = np.array([[one.height, np.ptp(one.levels[0].bounds, axis=0)[[0, 2]].max() / 2]
+                    for one in species])  # fmt: skip
+    feet, radii = [np.zeros((0, 2))], [np.zeros(0)]
+    for tile in np.flatnonzero(apart < reach):
+        plants = placement.plants(int(tile))
+        height, radius = own[plants.species].T
+        scale = np.where(np.isfinite(plants.height), plants.height, height) / height
+        hides = scale * height > EYE_M / 2
+        feet.append((plants.origin + plants.offset)[hides][:, [0, 2]])
+        radii.append((scale * radius)[hides])
+    foot, radius = np.concatenate(feet), np.concatenate(radii)
+    if not len(foot):
+        return xz
+    steps = np.arange(-SEARCHED_M, SEARCHED_M + 1e-9, CLEAR_M / 3)
+    places = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    places = places[np.argsort((places**2).sum(axis=1), kind="stable")]
+    room = np.empty(len(places))
+    for index, place in enumerate(xz + places):
+        ahead = place - [[0.0, 0.0], [0.0, CLEAR_M / 2], [0.0, CLEAR_M]]
+        away = np.linalg.norm(foot - ahead[:, None], axis=2) - radius
+        room[index] = away.min()
+    return np.asarray(xz + places[np.argmax(np.minimum(room, CLEAR_M / 2))])
 
 
 def _ground(terrain: Terrain, cells: int, extent: FloatArray | None = None) -> GroundMesh:

@@ -52,6 +52,12 @@ class Inventory:
     row: LongArray
     notes: tuple[str, ...] = ()
 
+    def tallest(self, count: int) -> FloatArray:
+        """(count,) metres that no plant of each species is taller than; NaN: the model's own."""
+        found = np.full(count, np.nan)
+        np.fmax.at(found, self.species, self.height)
+        return found
+
     def plants(self, tile: int, most: int | None = None) -> Plants:
         """The plants of a tile, 0..t-1, or the first `most` of them."""
         first, last = int(self.first[tile]), int(self.first[tile + 1])

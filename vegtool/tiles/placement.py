@@ -125,6 +125,9 @@ class Placement(Protocol):
     def notes(self) -> tuple[str, ...]:
         """Sentences on what was repaired, left out or guessed; to be shown to the user."""
 
+    def tallest(self, count: int) -> FloatArray:
+        """(count,) metres that no plant of each species is taller than; NaN: the model's own."""
+
     def plants(self, tile: int, most: int | None = None) -> Plants:
         """The plants of a tile, 0..t-1, or the first `most` of them."""
 

@@ -66,6 +66,11 @@ class Procedural:
     terrain: Terrain
     notes: tuple[str, ...] = ()
 
+    def tallest(self, count: int) -> FloatArray:
+        """(count,) metres that no plant of each species is taller than; NaN: the model's own."""
+        limits = [table.height_m for table in self.rules.tables[:count]]
+        return np.array([np.nan if limit is None else limit[1] for limit in limits])
+
     def plants(self, tile: int, most: int | None = None) -> Plants:
         """The plants of a tile, 0..t-1, or the first `most` of them."""
         where = int(self.column[tile]), int(self.row[tile])

@@ -7,7 +7,7 @@ uniform float transmission;
 uniform vec3 transmission_tint;
 #endif
 
-const float GROWING = 0.1;  // of the share that is kept: the elements that are not whole yet
+const float GROWING = 0.3;  // of the share that is kept: the elements that are not whole yet
 
 uniform mat4 view_projection;
 

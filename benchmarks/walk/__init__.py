@@ -1,0 +1,1 @@
+"""The parts of benchmarks/preview.py: landscapes that are walked through."""
