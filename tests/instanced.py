@@ -8,15 +8,18 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from cards import turned
 
 from vegtool.arrays import FloatArray, Picture
 from vegtool.elements import ordered
-from vegtool.gl.draw import Shot
+from vegtool.gl.draw import Shot, draw
 from vegtool.gl.instances import INSTANCE, WHOLE
 from vegtool.gl.landscape import Batch, Frame, Landscape, picture
+from vegtool.gl.upload import PlantBuffers
 from vegtool.lighting.light import Light
 from vegtool.measure.views import Camera, direction
 from vegtool.plant import Plant
+from vegtool.preview.eye import Eye
 
 AMBIENT = Light(sun=0.0, sky_above=1.0, sky_below=1.0)
 """Colours as they are, whatever they face."""
@@ -92,3 +95,17 @@ def coverage(
     """(h, w) share of each pixel that is covered."""
     drawn: Picture = picture(landscape, frame, shot, AMBIENT, supersample, samples, ground=False)
     return np.asarray(drawn[..., 3])
+
+
+def by_itself(
+    plant: Plant,
+    eye: Eye,
+    size: tuple[int, int],
+    yaw: float,
+    light: Light | None = None,
+    **how: int,
+) -> Picture:
+    """What gl.draw draws of a plant at the origin, turned by radians."""
+    seen = seen_from(eye.shot(*size), plant.center)
+    with PlantBuffers(turned(plant, yaw, 1.0, (0, 0, 0))) as buffers:
+        return draw(buffers, seen, light or Light(), **how)

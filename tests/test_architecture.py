@@ -49,7 +49,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     },
     "outcomes": {"batch", "console"},
     "inspect": {"branches", "formats", "console"},
-    "doctor": {"measure"},
+    "doctor": {"gl", "measure"},
     "console": set(),
     "flags": set(),
     "__main__": {"cli"},

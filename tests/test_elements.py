@@ -14,6 +14,7 @@ from vegtool.arrays import unit
 from vegtool.elements import (
     MORTON_BITS,
     MOST_FACES,
+    WOOD_POWER,
     Elements,
     area_ranks,
     morton_codes,
@@ -22,21 +23,30 @@ from vegtool.elements import (
     van_der_corput,
 )
 from vegtool.growth import sample
-from vegtool.plant import Material, Plant
+from vegtool.plant import Material, Plant, Role
 from vegtool.seeding import generator
 
 WOOD = Material("wood")
 
 
-def pieces(elements: Elements) -> list[set[int]]:
-    """Faces that hang together by a vertex, found one face after another."""
-    found: list[tuple[set[int], set[int]]] = []
-    for face, corners in enumerate(elements.faces.tolist()):
-        touched = [piece for piece in found if piece[0] & set(corners)]
-        found = [piece for piece in found if not piece[0] & set(corners)]
-        vertices = set(corners).union(*(piece[0] for piece in touched))
-        found.append((vertices, {face}.union(*(piece[1] for piece in touched))))
-    return [faces for _, faces in found]
+def pieces(elements: Elements) -> list[list[int]]:
+    """Faces that hang together by a vertex, found from face to face."""
+    at = [np.flatnonzero(row) for row in _touching(elements.faces)]
+    left, found = set(range(len(elements.faces))), []
+    while left:
+        piece = front = {min(left)}
+        while front := {int(f) for face in front for f in at[face]} - piece:
+            piece = piece | front
+        found.append(sorted(piece))
+        left -= piece
+    return found
+
+
+def _touching(faces: np.ndarray) -> np.ndarray:
+    """(f, f) bool: faces that share a vertex."""
+    uses = np.zeros((len(faces), faces.max() + 1), np.float32)
+    uses[np.arange(len(faces))[:, None], faces] = 1
+    return np.asarray(uses @ uses.T > 0)
 
 
 def fan(triangles: int) -> Plant:
@@ -119,27 +129,31 @@ def test_mortons_codes() -> None:
     assert morton_codes(np.full((3, 3), 7.0)).tolist() == [0, 0, 0]
 
 
-def test_wood_goes_by_area_the_largest_is_kept_longest() -> None:
-    """A face's rank is the share of all area that is in larger ones: of 1, 8, 4, 2 and 1, so that
-    at share 0.6 the trunk and the thickest branch are left."""
-    rank = area_ranks(np.array([1.0, 8, 4, 2, 1]))
-    assert rank.tolist() == [14 / 16, 0, 8 / 16, 12 / 16, 15 / 16]
-    area = generator(4, "areas").random(200)
-    plain = [sum(sorted(a for a in area if a > one)) / area.sum() for one in area]
-    np.testing.assert_allclose(area_ranks(area), plain, atol=1e-12)
-    assert area_ranks(np.empty(0)).shape == (0,)
-    assert area_ranks(np.zeros(4)).tolist() == [0] * 4
-    assert area_ranks(np.array([1.0, 0.0]))[1] < 1, "what has no area is drawn of a whole plant"
+def test_a_rank_is_the_share_of_all_area_in_larger_ones() -> None:
+    """Of areas 1, 8, 4, 2 and 1, as thick as they are large: half of all is in the trunk."""
+    area = np.array([1.0, 8, 4, 2, 1])
+    assert area_ranks(area, area).tolist() == [14 / 16, 0, 8 / 16, 12 / 16, 15 / 16]
+    thin = np.array([5.0, 1, 2, 3, 4])  # the largest is the thinnest
+    assert area_ranks(thin, area).tolist() == [0, 8 / 16, 4 / 16, 2 / 16, 1 / 16]
+    size, area = generator(4, "areas").random((2, 200))
+    plain = [sum(a for s, a in zip(size, area, strict=True) if s > one) for one in size]
+    np.testing.assert_allclose(area_ranks(size, area), np.array(plain) / area.sum(), atol=1e-12)
+    nothing = np.zeros(4)
+    assert area_ranks(np.empty(0), np.empty(0)).shape == (0,)
+    assert area_ranks(nothing, nothing).tolist() == [0] * 4
+    ends = np.array([1.0, 0.0])
+    assert area_ranks(ends, ends)[1] < 1, "what has no area is drawn of a whole plant"
 
 
-def test_wood_stays_as_long_as_it_is_large_and_is_not_enlarged() -> None:
+def test_wood_stays_as_long_as_it_is_thick_and_is_not_enlarged() -> None:
+    """Triangles of one shape; where half of the elements are kept, wood has 0.8 of its area."""
     sizes, apart = np.array([0.1, 0.8, 0.3]), np.arange(3)[:, None, None] * [0.0, 0, 1]
     stems = plant_of(sizes[:, None, None] * [[0.0, 0, 0], [1, 0, 0], [0, 1, 0]] + apart)
     found = ordered(replace(stems, materials=(WOOD,)))
     area = np.linalg.norm(stems.face_area_vectors, axis=1)
     assert [found.vertex[face[0]] // 3 for face in found.faces] == [1, 2, 0]
     larger = np.array([0, area[1], area[1] + area[2]])
-    np.testing.assert_allclose(found.face_rank, larger / area.sum())
+    np.testing.assert_allclose(found.face_rank, (larger / area.sum()) ** WOOD_POWER)
     assert not found.grows.any()
     assert ordered(stems).grows.all(), "leaves are"
 
@@ -171,10 +185,10 @@ def test_elements_share_no_vertices_and_each_has_one_rank_and_middle(name: str) 
     found = ordered(plant)
     assert sorted(np.unique(found.faces)) == list(range(len(found.vertex)))
     middles = plant.positions[found.vertex][found.faces].mean(axis=1)
-    for faces in pieces(found):
-        here = sorted(faces)
+    for here in pieces(found):
         corners = found.faces[here].ravel()
-        assert len(here) <= MOST_FACES
+        role = plant.materials[found.face_material[here[0]]].role
+        assert len(here) <= MOST_FACES[role]
         assert len({*found.face_material[here]}) == len({*found.grows[corners]}) == 1
         assert {*found.rank[corners]} == {*found.face_rank[here]}
         assert len({*found.rank[corners]}) == 1
@@ -184,10 +198,14 @@ def test_elements_share_no_vertices_and_each_has_one_rank_and_middle(name: str) 
     np.testing.assert_array_equal(found.grows[found.faces[:, 0]], leaf)
 
 
-def test_cards_stay_whole_and_larger_pieces_are_taken_apart() -> None:
-    assert len(pieces(ordered(cards(np.eye(3))))) == 3
-    for triangles in (1, MOST_FACES, MOST_FACES + 1, 40):
-        assert len(pieces(ordered(fan(triangles)))) == (1 if triangles <= MOST_FACES else triangles)
+@pytest.mark.parametrize("role", ["leaf", "wood"])
+def test_small_pieces_stay_whole_and_larger_ones_are_taken_apart(role: Role) -> None:
+    """So no twig is left with holes in it, and of what is one piece all over, as fronds or a
+    trunk with all of its branches, something is left."""
+    most = MOST_FACES[role]
+    for triangles in (1, most, most + 1, 3 * most):
+        plant = replace(fan(triangles), materials=(Material(role, role=role),))
+        assert len(pieces(ordered(plant))) == (1 if triangles <= most else triangles)
 
 
 def test_pieces_of_two_materials_are_two_elements() -> None:

@@ -8,9 +8,9 @@ from itertools import product
 import numpy as np
 import pytest
 
-from vegtool.tangents import tangents
 from vegtool.lod import Atlas, Billboards, Display, Level, billboard_quads, level_triangles
 from vegtool.plant import Material, Plant
+from vegtool.tangents import tangents
 
 FRONT = np.array([[2, 3, 10, 6], [20, 3, 5, 12]])
 BACK = np.array([[2, 20, 10, 6], [30, 20, 5, 12]])

@@ -323,7 +323,12 @@ def preview_command(
     read: ReadOptions,
     camera: Annotated[
         Path | None,
-        typer.Option("--path", help="A camera path to walk.", metavar="PATH.toml", parser=_path),
+        typer.Option(
+            "--path",
+            help="A camera path to walk; by default the scene's.",
+            metavar="PATH.toml",
+            parser=_path,
+        ),
     ] = None,
     out: Annotated[
         Path | None,
@@ -351,7 +356,7 @@ def preview_command(
         Path | None,
         typer.Option(
             "--html",
-            help="Write a page that shows the plants in any browser.",
+            help="Write a page that shows converted plants in any browser.",
             metavar="FILE.html",
             parser=_path,
         ),
@@ -372,7 +377,9 @@ def preview_command(
 
         vegtool preview out/ --scene scene.toml --fps 30
 
-        vegtool preview out/ --scene scene.toml --path walk.toml --out walk.mp4
+        vegtool preview oak.glb --screenshot oak.png
+
+        vegtool preview out/ --scene scene.toml --path way.toml --out way.mp4
 
         vegtool preview out/ --html page.html
     """
@@ -380,8 +387,7 @@ def preview_command(
 
     console = Console(-1 if quiet else verbose, json)
     wanted = Wanted(path, scene, camera, out, screenshot, frames, stats, html, force)
-    with console.bar("preview") as progress:
-        result = run_preview(wanted, preview, read, progress, console.say)
+    result = run_preview(wanted, preview, read, console.bar, console.say)
     console.result(result.facts, result.text)
 
 

@@ -24,9 +24,13 @@ class Check:
     required: bool = False
 
 
+PYRENDER = "pyrender-maintained"
+
 OPTIONAL_PACKAGES = {
     "DracoPy": ("reads Draco-compressed glTF", "pip install 'vegtool[draco]'"),
     "matplotlib": ("draws the plots of vegtool report", "pip install 'vegtool[report]'"),
+    "av": ("writes films of vegtool preview as MP4", "pip install 'vegtool[video]'"),
+    "rasterio": ("reads heightmaps that are GeoTIFFs", "pip install 'vegtool[geo]'"),
 }
 
 OPTIONAL_PROGRAMS = {
@@ -39,7 +43,7 @@ OPTIONAL_PROGRAMS = {
 
 def diagnose() -> list[Check]:
     """All checks, the required ones first."""
-    return [_python(), *_drawing(), *_packages(), *_programs()]
+    return [_python(), *_drawing(), _windows(), *_packages(), *_programs()]
 
 
 def _python() -> Check:
@@ -55,6 +59,17 @@ def _drawing() -> list[Check]:
     except CapabilityError as error:
         return [Check("drawing", False, "no OpenGL context", str(error), required=True)]
     return [Check(f"drawing: {name}", True, value, required=True) for name, value in about.items()]
+
+
+def _windows() -> Check:
+    from vegtool.gl.window import check_display
+
+    purpose = "shows vegtool preview; its pictures, films and pages need none"
+    try:
+        check_display()
+    except CapabilityError as error:
+        return Check("windows", False, f"optional: {purpose}", str(error))
+    return Check("windows", True, f"a display, and pyrender {version(PYRENDER)}: {purpose}")
 
 
 def _packages() -> list[Check]:

@@ -1,7 +1,8 @@
 """The landscapes that are walked through, and the plants in them: made by script, and kept.
 
 Both are flat, and their plants are placed procedurally, at the spacing at which all that stand are
-as many as wanted (WITHIN). Plants are samples of vegtool, converted by `vegtool convert`.
+as many as wanted (WITHIN). A trail leads through them. Plants are samples of vegtool, converted as
+`vegtool convert` does.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from dataclasses import asdict, dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from zlib import crc32
 
 import numpy as np
 
@@ -20,6 +22,7 @@ from vegtool.batch import Job, Task, convert_file
 from vegtool.convert import ConvertOptions
 from vegtool.formats import ReadOptions
 from vegtool.formats.gltf import plant_glb
+from vegtool.formats.png import encode
 from vegtool.growth import sample
 from vegtool.measure.pictures import client_plant
 from vegtool.preview.library import Species
@@ -27,8 +30,9 @@ from vegtool.preview.world import World, read_world
 from vegtool.scene import read_scene
 from vegtool.tiles.blue_noise import COUNT
 from vegtool.tiles.pattern import least_distance
-from vegtool.tiles.placement import placement_of
+from vegtool.tiles.placement import Placement, placement_of
 from vegtool.tiles.terrain import terrain_of
+from walk.trail import density
 
 OPAQUE = ConvertOptions(refine="opaque", levels=8, billboards=1024)
 """What the plants of landscapes are converted with: for viewers that can fill little."""
@@ -92,6 +96,8 @@ SETTINGS = {
     ),
 }
 TREES = ("broadleaf", "conifer")
+BESIDE_TRAIL = (*TREES, "bush")
+TRAIL = "trail.png"
 PLANTS = tuple(SETTINGS["forest"].kinds)
 
 
@@ -117,27 +123,28 @@ def library(cache: Path, names: Sequence[str], options: ConvertOptions, say: Say
 
 def scene_of(setting: Setting, cache: Path, say: Say) -> Path:
     """The scene file of a landscape, written where that was not done before."""
-    folder = cache / f"{setting.name}_{key_of(setting)}"
+    where = density(setting.side_m)
+    folder = cache / f"{setting.name}_{key_of(setting, SEED, WITHIN, crc32(where))}"
     path = folder / "scene.toml"
     if path.exists():
         return path
     folder.mkdir(parents=True, exist_ok=True)
     draft = folder / "draft.toml"
+    (folder / TRAIL).write_bytes(encode(where))
     period = setting.side_m * (COUNT / setting.plants) ** 0.5
     spacing, found = period * least_distance(), 0
     while not abs(found - setting.plants) <= WITHIN * setting.plants:
         spacing *= (found / setting.plants) ** 0.5 if found else 1.0
         draft.write_text(_written(setting, spacing), encoding="utf-8")
-        found = plants_in(draft)
+        read = read_scene(draft)
+        found = plants_in(placement_of(read, terrain_of(read)))
     say(f"{setting.name}: {found:,} plants, {spacing:.4f} m between them at least")
     draft.rename(path)
     return path
 
 
-def plants_in(scene: Path) -> int:
+def plants_in(placement: Placement) -> int:
     """How many plants stand there: all tiles are asked."""
-    read = read_scene(scene)
-    placement = placement_of(read, terrain_of(read))
     return sum(len(placement.plants(tile)) for tile in range(len(placement.tiles)))
 
 
@@ -185,4 +192,5 @@ def _written(setting: Setting, spacing_m: float) -> str:
         low, high = kind.height_m
         lines += ["", "[[species]]", f'name = "{name}"', f"share = {kind.share:g}"]
         lines += [f"height_m = [{low:g}, {high:g}]"]
+        lines += [f'density = "{TRAIL}"'] * (name in BESIDE_TRAIL)
     return "\n".join(lines) + "\n"

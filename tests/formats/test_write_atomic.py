@@ -127,7 +127,7 @@ def test_a_file_where_the_folder_should_be(tmp_path: Path):
 
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs a folder nobody may write to")
 def test_an_unwritable_folder():
-    with pytest.raises(OutputError, match=r"cannot be written .*-o"), FileSet(Path("/proc/out")):
+    with pytest.raises(OutputError, match=r"cannot be written .*place"), FileSet(Path("/proc/out")):
         pass
 
 

@@ -19,6 +19,7 @@ from instanced import (
 from plants import plant_of
 
 from vegtool.elements import ordered
+from vegtool.gl import upload
 from vegtool.gl.context import framebuffer_kept
 from vegtool.gl.draw import begin, draw
 from vegtool.gl.instances import (
@@ -42,6 +43,8 @@ pytestmark = pytest.mark.gl
 
 LIGHT = Light(np.array([0.4, 0.7, 1.0]), 0.6, 0.4, 0.2)
 STEP = 1 / 255
+GROWING = 1 - 1 / WHOLE
+"""Of the share that is kept: the elements that are not whole yet."""
 
 
 def leaf_picture(size: int = 32) -> np.ndarray:
@@ -61,7 +64,8 @@ def bumps(size: int = 32) -> np.ndarray:
 
 def foliage(material: Material, count: int = 25) -> Plant:
     rng = generator(1, "foliage")
-    middles = rng.uniform(-0.8, 0.8, (count, 3)) + (0, 1, 0)
+    middles = rng.uniform(-0.8, 0.8, (count, 3))
+    middles[:, 1] += 1
     return cards(middles, rng.uniform(0.15, 0.35, count), material, rng.normal(size=(count, 3)))
 
 
@@ -95,9 +99,14 @@ def plants() -> dict[str, Plant]:
         "colours": replace(plain, colors=colors),
         "coloured leaves": replace(foliage(masked), colors=colors),
         "two materials": together(foliage(masked, 12), foliage(replace(green, role="wood"), 9)),
-        "a tree": sample("broadleaf", 1200),
-        "a lit bush": translucent(sample("bush", 900), 0.5),
+        "a tree": without_normals(sample("broadleaf", 1200)),
+        "a lit bush": translucent(without_normals(sample("bush", 900)), 0.5),
     }
+
+
+def without_normals(plant: Plant) -> Plant:
+    """Whose tubes have a normal texture, of which frames at vertices make something else."""
+    return replace(plant, materials=tuple(replace(m, normal_texture=None) for m in plant.materials))
 
 
 WHERE = {"yaw": 0.7, "scale": 1.3}
@@ -119,14 +128,17 @@ def by_hand(plant: Plant, *moved: Plant, size_m: float = 3.5, supersample: int =
 def assert_same(found: np.ndarray, wanted: np.ndarray, rest: float = 0.005) -> None:
     """To a grey level but for a few pixels, on edges, of whose nine samples one falls to the other
     side."""
-    assert (wanted[..., 3] > 0).mean() > 0.1, "there is something to see"
+    assert (wanted[..., 3] > 0).mean() > 0.05, "there is something to see"
     off = np.abs(found - wanted).max(axis=-1)
     assert (off > STEP).mean() <= rest, f"{(off > STEP).mean():.4f} differ, up to {off.max():.3f}"
     assert np.abs(found - wanted).mean() < STEP / 4
 
 
 @pytest.mark.parametrize("name", list(plants()))
-def test_an_instance_is_the_plant_turned_scaled_and_moved(name: str) -> None:
+def test_an_instance_is_the_plant_turned_scaled_and_moved(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(upload, "MINIFIED", np.inf)  # all textures are filtered
     plant = plants()[name]
     scale = WHERE["scale"] * 2 / plant.extent
     foot = FOOT - (0, plant.bounds[0, 1] * scale, 0) if "a " in name else FOOT
@@ -135,6 +147,21 @@ def test_an_instance_is_the_plant_turned_scaled_and_moved(name: str) -> None:
         shot = facing((70, 60), 3.5, 25, 12)
         found = picture(landscape, frame_of(row), shot, LIGHT, supersample=3)
     assert_same(found, by_hand(turned(plant, WHERE["yaw"], scale, foot)))
+
+
+def test_frames_at_vertices_are_nearly_those_of_pixels(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On tubes, along which they turn: to four grey levels, and none on average."""
+    monkeypatch.setattr(upload, "MINIFIED", np.inf)
+    plant = sample("dead-tree", 900)
+    assert any(material.normal_texture is not None for material in plant.materials)
+    scale = 2.4 / plant.extent
+    with landscape_of(plant, mipmaps=False) as landscape:
+        shot = facing((70, 60), 3.5, 25, 12)
+        row = instance(FOOT, yaw=WHERE["yaw"], scale=scale)
+        found = picture(landscape, frame_of(row), shot, LIGHT, supersample=3)
+    wanted = by_hand(turned(plant, WHERE["yaw"], scale, FOOT))
+    off = np.abs(found - wanted)[wanted[..., 3] > 0]
+    assert (off.max(axis=-1) > 4 * STEP).mean() < 0.05 and off.mean() < STEP
 
 
 def test_two_instances_are_two_plants() -> None:
@@ -197,12 +224,12 @@ def rows_of_cards(count: int = 40) -> Plant:
 
 
 def kept_by_hand(plant: Plant, kept: float, length: float = 1.0) -> Plant:
-    """What is left of a plant, in plain words: an element is as large as its rank is below the
-    share that is kept, in tenths of that share, and whole from one on."""
+    """What is left of a plant: an element's size goes from 0 to 1 as its rank goes from the share
+    that is kept to GROWING of that share below it."""
     found = ordered(plant)
     positions = np.empty((len(found.vertex), 3))
     for vertex, of in enumerate(found.vertex):
-        size = min(max((kept - found.rank[vertex]) / (0.1 * kept), 0.0), 1.0)
+        size = min(max((kept - found.rank[vertex]) / (GROWING * kept), 0.0), 1.0)
         size *= length if found.grows[vertex] else 1.0
         middle = found.middle[vertex]
         positions[vertex] = middle + size * (plant.positions[of] - middle)
@@ -231,20 +258,20 @@ def test_what_is_kept_is_the_first_part_and_its_last_grow(kept: float, length: f
 
 
 def test_nothing_pops() -> None:
-    """Coverage grows with the share that is kept, in small steps: no more than one element's worth
-    where a fortieth of the share is added."""
-    plant = rows_of_cards()
+    """Coverage grows with the share that is kept; from a third of it on several elements grow at a
+    time, so that it does in steps of hardly more than what the share does."""
+    plant, shares = rows_of_cards(), np.linspace(0, WHOLE, 121)
     with landscape_of(plant, mipmaps=False) as landscape:
-        covered = [
-            coverage(landscape, frame_of(instance(kept=kept)), facing(100, 3.5), 0, 2).sum()
-            for kept in np.linspace(0, WHOLE, 90)
-        ]
-    whole = covered[-1]
+        covered = np.array(
+            [
+                coverage(landscape, frame_of(instance(kept=kept)), facing(100, 3.5), 0, 2).sum()
+                for kept in shares
+            ]
+        )
     assert covered[0] == 0 and (np.diff(covered) >= 0).all()
-    assert np.diff(covered).max() < 1.3 * whole / 40
-    with landscape_of(plant, mipmaps=False) as landscape:
-        only = coverage(landscape, frame_of(instance()), facing(100, 3.5), 0, 2).sum()
-    assert whole == only == pytest.approx(40 * (0.2 * 100 / 3.5) ** 2, rel=0.05)
+    assert covered[-1] == pytest.approx(40 * (0.2 * 100 / 3.5) ** 2, rel=0.03)
+    steps = np.diff(covered) / covered[-1]
+    assert steps[shares[:-1] > 1 / 3].max() < 1.6 * (shares[1] - shares[0])
 
 
 def drawn_triangles(landscape: Landscape, frame: Frame) -> tuple[Drawn, int]:
@@ -288,52 +315,44 @@ def test_nothing_is_drawn_of_no_rows() -> None:
 # -- alpha -----------------------------------------------------------------------------------------
 
 
-def ramp(size: int = 64) -> np.ndarray:
-    """Alpha that falls from left to right, over a quarter of the picture: half of it is shown."""
-    across = np.clip(0.5 - 4 * ((np.arange(size) + 0.5) / size - 0.5), 0, 1)
-    image = np.full((size, size, 4), 255.0)
-    image[..., 3] = np.rint(255 * across)
-    return image
+PIXELS = 40
+"""Across a card of 1 m."""
+RADIUS = 0.4
 
 
-def edge_card(roll: float) -> Plant:
-    """A card of 1 m, turned about the view."""
-    leaf = Material("leaf", color_texture=texture(ramp()), alpha_mode="mask", role="leaf")
-    card = cards(np.zeros(3), 0.5, leaf)
-    c, s = np.cos(roll), np.sin(roll)
-    return replace(card, positions=card.positions @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]))
+def disc(texels: int, width: float) -> Plant:
+    """A card of 1 m, on which a disc is left of an alpha that falls along a width in metres."""
+    y, x = (np.mgrid[:texels, :texels] + 0.5) / texels - 0.5
+    image = np.full((texels, texels, 4), 255.0)
+    image[..., 3] = np.rint(255 * np.clip(0.5 + (RADIUS - np.hypot(x, y)) / width, 0, 1))
+    leaf = Material("leaf", color_texture=texture(image), alpha_mode="mask", role="leaf")
+    return cards(np.zeros(3), 0.5, leaf)
 
 
-PLACES = generator(4, "places").random((12, 2))
-
-
-@pytest.mark.parametrize("roll", [0.0, 0.2, 0.9])
-def test_edges_of_leaves_are_tested_at_each_sample_and_keep_their_area(roll: float) -> None:
-    """A card of 1 m on 40 of 48 pixels, a fortieth part of which is a pixel. Half of it is shown:
-    its mean area, over places in the grid of pixels, to three per mille. Within the card, four
-    samples make five coverages along its edge, and one test for all makes two."""
-    plant = edge_card(roll)
-    inside = facing(64, 64 / 40)
-    soft, hard = [], []
+@pytest.mark.parametrize(
+    ("texels", "width"), [(32, 0.25), (64, 0.06), (128, 0.06), (128, 0.02), (256, 0.02)]
+)
+def test_edges_are_tested_at_each_sample_and_leaves_keep_their_area(
+    texels: int, width: float
+) -> None:
+    """Of texels smaller and larger than pixels. Over places in the grid of pixels the area of the
+    disc is what it is to five per mille, and edges are off from what 256 samples make of them by
+    less than half of what one test for all four is."""
+    plant = disc(texels, width)
+    shots = [
+        shifted(facing(64, 64 / PIXELS), *place) for place in generator(4, "places").random((12, 2))
+    ]
+    whole = frame_of(instance())
     with landscape_of(plant) as landscape, PlantBuffers(plant, mipmaps=True) as buffers:
-        for place in PLACES:
-            shot = shifted(inside, *place)
-            soft.append(coverage(landscape, frame_of(instance()), shot))
-            hard.append(draw(buffers, shot, AMBIENT, samples=4)[..., 3])
-    areas = [float(one.sum()) / 40**2 for one in soft]
-    assert np.mean(areas) == pytest.approx(0.5, abs=0.003)
-    # what an edge's coverage is off from that of its own pixels, averaged from many samples
+        soft = np.stack([coverage(landscape, whole, shot) for shot in shots])
+        hard = np.stack([draw(buffers, shot, AMBIENT, samples=4)[..., 3] for shot in shots])
     with landscape_of(plant, mipmaps=False) as landscape:
-        exact = [
-            coverage(landscape, frame_of(instance()), shifted(inside, *place), 0, 16)
-            for place in PLACES
-        ]
-    edge = [(e > 0.02) & (e < 0.98) for e in exact]
-    off = {
-        name: np.sqrt(np.mean([np.mean((f[w] - e[w]) ** 2) for f, e, w in zip(found, exact, edge)]))
-        for name, found in (("soft", soft), ("hard", hard))
-    }
-    assert off["soft"] < 0.6 * off["hard"]
+        exact = np.stack([coverage(landscape, whole, shot, 0, 16) for shot in shots])
+    area = len(shots) * PIXELS**2 * np.pi * RADIUS**2
+    assert soft.sum() == pytest.approx(area, rel=0.005)
+    edge = (exact > 0.02) & (exact < 0.98)
+    off = [float(np.sqrt(np.mean((one - exact)[edge] ** 2))) for one in (soft, hard)]
+    assert off[0] < 0.5 * off[1]
 
 
 @pytest.mark.parametrize("kind", ["masked", "opaque"])
@@ -344,16 +363,11 @@ def test_what_is_covered_by_a_texture_in_full_has_no_holes(kind: str) -> None:
         alpha_mode="mask" if kind == "masked" else "opaque",
     )  # fmt: skip
     with landscape_of(cards(np.zeros(3), 0.5, material)) as landscape:
-        for pixels in (4, 20, 64, 100):
-            seen = coverage(landscape, frame_of(instance()), facing(pixels, 0.9, 30, 40))
+        for pixels in (2, 20, 64, 100):
+            seen = coverage(landscape, frame_of(instance()), facing(pixels, 0.5, 30, 40))
             assert (seen == 1).all()
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="soft_edges.glsl carries alpha on below 0, the cutoff of opaque materials, so that these "
-    "have holes where the alpha of their texture, which they ignore, falls to 0 within a pixel",
-)
 def test_opaque_materials_ignore_alpha() -> None:
     """A texture that is cut out for another material too: squares of alpha 0 and 1."""
     squares = np.full((16, 16, 4), 255)
@@ -424,7 +438,7 @@ def test_wireframe_draws_edges_alone() -> None:
         edges = viewed(landscape, frame_of(instance()), "lit", wireframe=True).any(axis=-1)
         again = viewed(landscape, frame_of(instance()), "lit").any(axis=-1)
     assert whole.sum() == 400 and 60 <= edges.sum() <= 120
-    assert edges[10:30, 10:12].any(axis=1).all() and edges[20, 14:26].sum() <= 4
+    assert edges[10:30, 9:12].any(axis=1).all() and edges[20, 14:26].sum() <= 4
     np.testing.assert_array_equal(whole, again)
 
 
@@ -455,7 +469,7 @@ def test_rows_hold_what_a_vertex_has() -> None:
 
 
 def test_mirrored_pictures_split_vertices() -> None:
-    """Two triangles that share an edge, one of whose pictures is mirrored: four vertices are six."""
+    """Triangles that share an edge, one of whose pictures is mirrored: four vertices are six."""
     card = plants()["normals"]
     plant = replace(
         card, positions=card.positions[:4], normals=card.normals[:4],
@@ -478,16 +492,18 @@ def test_faces_that_show_one_place_of_a_texture_are_without_texels() -> None:
 
 
 def test_what_has_no_texels_fades_by_elements() -> None:
-    """Where texels fade: at a share of 0.5 half of the elements."""
+    """Where texels fade, a mesh keeps the share of its elements in place of its texels, and a plane
+    beside it all of its own."""
     leaf = Material("leaf", color_texture=texture(np.full((4, 4, 4), 255)), alpha_mode="mask")
-    plant = replace(rows_of_cards(), materials=(leaf,))
-    mesh = replace(plant, uvs=np.full_like(plant.uvs, 0.25))
-    for one, solid in ((mesh, True), (plant, False)):
+    plane = replace(rows_of_cards(), materials=(leaf,))
+    mesh = replace(plane, uvs=np.full_like(plane.uvs, 0.25))
+    shot = facing(100, 3.5)
+    half = frame_of(instance(solid=0.5), fading=True)
+    for one, kept in ((mesh, 0.5 * WHOLE), (plane, WHOLE)):
         with landscape_of(one) as landscape:
-            row = instance(shown=2.0, solid=0.5, kept=1.0)
-            half = coverage(landscape, frame_of(row, fading=True), facing(100, 3.5)).sum()
-            whole = coverage(landscape, frame_of(instance()), facing(100, 3.5)).sum()
-        assert half / whole == pytest.approx(0.5 if solid else 1.0, abs=0.07 if solid else 0.11)
+            found = coverage(landscape, half, shot)
+            wanted = coverage(landscape, frame_of(instance(kept=kept)), shot)
+        np.testing.assert_array_equal(found, wanted)
 
 
 def test_a_program_has_no_more_than_its_material_needs() -> None:

@@ -117,6 +117,17 @@ def test_the_file_decides_and_the_seed_what_it_leaves_open(tmp_path: Path) -> No
         assert (getattr(plants, name)[b] != getattr(others, name)[d]).all()
 
 
+def test_the_tallest_of_each_kind_is_known_before_any_tile_is_asked_for(tmp_path: Path) -> None:
+    """On whichever tile it stands. One without a height, as tall as its model, is passed over;
+    where none of a kind has one, or none is there, there is nothing to say."""
+    rows = ["1,1,ash,3", "400,1,ash,12.5", "-300,9,ash,", "2,2,pine,"]
+    placement = inventory(tmp_path, rows, "x,y,species,height")
+    assert len(placement.tiles) > 1
+    np.testing.assert_array_equal(placement.tallest(3), [12.5, np.nan, np.nan])
+    without = inventory(tmp_path, ["1,1,ash", "2,2,pine"])
+    assert np.isnan(without.tallest(2)).all()
+
+
 def test_a_row_removed_changes_no_other(tmp_path: Path) -> None:
     """But for its number, which is the row's: so the last one."""
     rng = np.random.default_rng(2)

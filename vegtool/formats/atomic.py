@@ -131,7 +131,7 @@ def check_free(
             )
         if not force:
             raise OutputError(
-                f"{path}: exists already. Overwrite it with -f, or choose another folder with -o."
+                f"{path}: exists already. Overwrite it with -f, or choose another place."
             )
 
 
@@ -145,7 +145,7 @@ def _check_folder(folder: Path) -> None:
             raise PermissionError(EACCES, os.strerror(EACCES))
 
 
-_ELSEWHERE = "Choose another folder with -o."
+_ELSEWHERE = "Choose another place."
 
 
 def _same(path: Path, other: Path) -> bool:
@@ -170,7 +170,7 @@ def explained(path: Path) -> Iterator[None]:
             reason = "the name is too long here. Rename the input, or choose"
         else:
             reason = f"cannot be written ({error.strerror}). Allow it, or choose"
-        raise OutputError(f"{path}: {reason} another folder with -o.") from error
+        raise OutputError(f"{path}: {reason} another place.") from error
 
 
 def _finish(action: Callable[[], None]) -> None:

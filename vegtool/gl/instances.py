@@ -168,6 +168,7 @@ def instance_program(
     """The program that draws one material of many plants. fading: "" for whole ones, "texels" or
     "pixels" for what reveals them."""
     material = group.material
+    masked = material.alpha_mode == "mask"
     plain = material.color_texture is None and group.normal_map is None and group.light_map is None
     defines = {
         "VERTEX_LIT": plain,
@@ -178,7 +179,7 @@ def instance_program(
         "NORMAL_MAP": group.normal_map is not None and not material.unlit,
         "TANGENTS": group.normal_map is not None and not material.unlit,
         "LIGHT_MAP": group.light_map is not None and not material.unlit,
-        "SOFT_EDGES": buffers.mipmaps and not plain,
+        "SOFT_EDGES": buffers.mipmaps and not plain and (masked or fading == "texels"),
         "REVEAL": bool(fading) and (fading == "pixels" or not plain),
         "DITHERED": fading == "pixels",
         "PAINTED": view == "painted",

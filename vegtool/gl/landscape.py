@@ -16,12 +16,20 @@ from vegtool.arrays import ByteArray, FloatArray, IntArray, Picture
 from vegtool.elements import Elements
 from vegtool.gl.context import OnGpu, check, context, framebuffer_kept
 from vegtool.gl.draw import ANISOTROPY, Shot, begin, resolved, set_footprint, set_light, tiles
-from vegtool.gl.instances import INSTANCE, NOISE, InstancedPlant, View, instance_program
+from vegtool.gl.instances import (
+    INSTANCE,
+    NOISE,
+    OVERDRAW_STEP,
+    InstancedPlant,
+    View,
+    instance_program,
+)
 from vegtool.gl.program import program
 from vegtool.gl.targets import drawing_target
 from vegtool.lighting.light import Light
 from vegtool.plant import Plant
 
+GROUND_VERTEX = ("in_position", "in_normal")
 GROUND_COLOR = (0.105, 0.125, 0.055)
 """Linear: grown-over soil."""
 
@@ -135,7 +143,8 @@ class Landscape(OnGpu):
         with self._samples:
             draws, triangles = self._draw_plants(frame, shot, light, view)
             if ground and self._ground is not None:  # last: most of it is hidden
-                triangles += self._ground.draw(shot, light)
+                self.ctx.disable(moderngl.CULL_FACE)
+                triangles += self._ground.draw(shot, light, view)
                 draws += 1
         self.ctx.wireframe = False
         self.ctx.enable_only(moderngl.DEPTH_TEST)
@@ -208,24 +217,40 @@ class _Ground:
         data = np.concatenate([mesh.positions, mesh.normals], axis=1).astype(np.float32)
         self._vertices = ctx.buffer(np.ascontiguousarray(data))
         self._indices = ctx.buffer(np.ascontiguousarray(mesh.faces, np.uint32))
-        self._program = program(ctx, "ground.vert", "ground.frag")
-        content = [(self._vertices, "3f 3f", "in_position", "in_normal")]
-        self._array = ctx.vertex_array(self._program, content, self._indices)
+        self._arrays: dict[tuple[str, ...], moderngl.VertexArray] = {}
 
-    def draw(self, shot: Shot, light: Light) -> int:
+    def draw(self, shot: Shot, light: Light, view: View) -> int:
+        """Draw it; returns how many triangles it has."""
+        array = self._array((f"OVERDRAW {OVERDRAW_STEP}",) if view == "overdraw" else ())
         place = np.eye(4)
         place[:3, 3] = self.origin - shot.target
-        self._program["view_projection"] = tuple((shot.view_projection @ place).T.ravel())
-        self._program["color"] = GROUND_COLOR
-        values = {"sun_direction": tuple(light.unit), "sun": light.sun}
-        for name, value in {**values, "sky": (light.sky_above, light.sky_below)}.items():
-            self._program[name] = value
-        self._array.render()
+        values = {
+            "view_projection": tuple((shot.view_projection @ place).T.ravel()),
+            "color": GROUND_COLOR,
+            "sun_direction": tuple(light.unit),
+            "sun": light.sun,
+            "sky": (light.sky_above, light.sky_below),
+        }
+        for name, value in values.items():
+            if name in array.program:  # the compiler drops what a variant does not read
+                array.program[name] = value
+        array.render()
         return self.count
 
     def release(self) -> None:
-        for made in (self._array, self._vertices, self._indices):
-            made.release()
+        for array in self._arrays.values():
+            array.release()
+        self._vertices.release()
+        self._indices.release()
+
+    def _array(self, defines: tuple[str, ...]) -> moderngl.VertexArray:
+        if defines not in self._arrays:
+            shader = program(self.ctx, "ground.vert", "ground.frag", *defines)
+            names = [name for name in GROUND_VERTEX if name in shader]
+            layout = " ".join("3f" if name in shader else "12x" for name in GROUND_VERTEX)
+            content = [(self._vertices, layout, *names)]
+            self._arrays[defines] = self.ctx.vertex_array(shader, content, self._indices)
+        return self._arrays[defines]
 
 
 def _noise_texture(ctx: moderngl.Context, noise: Sequence[ByteArray]) -> moderngl.Texture:

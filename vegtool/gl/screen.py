@@ -68,21 +68,26 @@ class Screen(OnGpu):
         wanted = (max(size[0], 1), max(size[1], 1))
         if wanted == self.size:
             return
-        self._free()
-        ctx = self.ctx
+        ctx, old = self.ctx, self._owned
         try:
-            self._color = ctx.texture(wanted, 4, dtype="f2", samples=self.samples)
+            color = ctx.texture(wanted, 4, dtype="f2", samples=self.samples)
             depth = ctx.depth_renderbuffer(wanted, samples=self.samples)
-            self._drawn = ctx.framebuffer([self._color], depth)
-            self._resolved = ctx.texture(wanted, 4)
-            self._pixels = ctx.framebuffer([self._resolved])
+            drawn = ctx.framebuffer([color], depth)
+            resolved = ctx.texture(wanted, 4)
+            pixels = ctx.framebuffer([resolved])
         except moderngl.Error as error:
+            _ = ctx.error  # told here, and not to what is drawn next
             raise CapabilityError(
                 f"{describe(ctx).renderer} cannot draw a frame of {wanted[0]} x {wanted[1]} pixels "
                 f"({error}); make it smaller"
             ) from error
-        self._owned = [self._drawn, self._color, depth, self._pixels, self._resolved]
+        self._drawn, self._pixels = drawn, pixels
+        self._color, self._resolved = color, resolved
+        self._owned = [drawn, color, depth, pixels, resolved]
         self.size = wanted
+        drawn.use()  # what is released must not be in use
+        for made in old:
+            made.release()
 
     def _free(self) -> None:
         for made in self._owned:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "RATE", "Backdrop", "Client", "Drag", "Event", "Key", "Resize", "Scroll", "Window",
-    "headless_picture", "open_window",
+    "check_display", "headless_picture", "open_window",
 ]  # fmt: skip
 
 RATE = 60.0
@@ -160,6 +160,12 @@ def open_window(
     else:
         viewer.open()
     return Window(stage, viewer, threaded)
+
+
+def check_display() -> None:
+    """Raise CapabilityError where there is no display or no pyrender, as `open_window` would: to be
+    asked before long work."""
+    _viewer_class().check_display()
 
 
 def headless_picture(client: Client, size: tuple[int, int]) -> ByteArray:

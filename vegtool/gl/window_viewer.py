@@ -112,6 +112,14 @@ class StageViewer(pyrender.Viewer):  # type: ignore[misc]
             _scene(backdrop), viewport_size=size, run_in_thread=threaded, auto_start=False
         )
 
+    @staticmethod
+    def check_display() -> None:
+        """Raise CapabilityError where there is none."""
+        try:
+            pyglet.display.get_display()
+        except Exception as error:  # each system has its own
+            raise _cannot_open(error) from error
+
     # -- life: open, run, shut, all in one thread ------------------------------------------------
 
     def open(self) -> None:
@@ -320,6 +328,8 @@ def _button(buttons: int) -> str:
 def _cannot_open(error: Exception) -> CapabilityError:
     found = f"{type(error).__name__}: {error}".rstrip(": ")
     if type(error).__name__ == "NoSuchDisplayException":
+        name = os.environ.get("DISPLAY")
+        found = f"DISPLAY is {name}, where none answers" if name else "DISPLAY is not set"
         return CapabilityError(
             f"a window needs a display, and none was found ({found}). Run this where there is one, "
             "or use --screenshot, which draws without a window."

@@ -93,9 +93,10 @@ def corrected(
     with Landscape([np.zeros((8, 8), np.uint8)], ctx=landscape.ctx) as truth:
         truth.add(species.levels[0], elements, mipmaps=False)
         wanted = _wanted(truth, kinds, kind, at, focal_px)
-        for i, distance in enumerate(at):
+        yield 1 / len(at), (stage, factor)  # nearer than the first, nothing is left out
+        for i, distance in enumerate(at[1:], start=1):
             views = _views(kinds, kind, float(distance), focal_px, LARGEST_PX)
-            factor[i] = factor[i - 1] if i else 1.0
+            factor[i] = factor[i - 1]
             for _ in range(ROUNDS):
                 only = np.zeros(1), np.full(1, factor[i])
                 tried = replace(kinds, corrections=(only,) * len(kinds.count))

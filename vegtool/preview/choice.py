@@ -129,12 +129,14 @@ def kinds_of(
 class Switches:
     """Where levels follow each other at a detail, float32, of plants of scale 1.
 
-    start, end: (s, l) metres, of each level's fade. whole_m: (s,) metres, up to which the original
-    is drawn whole. coarse_m: (s,) metres, up to which the last level is.
+    start, end: (s, l) metres, of each level's fade; ascending, a level that is left out begins
+    where the next one does. before: (s, l) the level that each one follows. whole_m: (s,) metres,
+    up to which the original is drawn whole. coarse_m: (s,) metres, up to which the last level is.
     """
 
     start: np.ndarray
     end: np.ndarray
+    before: np.ndarray
     whole_m: np.ndarray
     coarse_m: np.ndarray
     count: np.ndarray
@@ -161,17 +163,26 @@ class Switches:
 def switches(kinds: Kinds, detail: float) -> Switches:
     """Where levels follow each other: from the stated distances on, or from where there is no room
     for more triangles. detail: factor of the distances at which there is room."""
-    start = np.minimum(kinds.switch_m, detail * kinds.room_m).astype(np.float32)
+    start = np.minimum(kinds.switch_m, detail * kinds.room_m)
     start[:, 0] = 0.0
+    start = np.minimum.accumulate(start[:, ::-1], axis=1)[:, ::-1].astype(np.float32)
     end = (start * (1 + kinds.fade)).astype(np.float32)
+    following = np.where(start[:, 1:] > start[:, :-1], start[:, 1:], np.inf)
+    end[:, :-1] = np.minimum(end[:, :-1], following)
+    end = np.minimum.accumulate(end[:, ::-1], axis=1)[:, ::-1]
+    level = np.arange(start.shape[1])
+    earlier = start[:, None, :] < start[:, :, None]  # level, earlier level
+    before = np.where(earlier, level, 0).max(axis=2)
     last = kinds.count - 1
     each = np.arange(len(last))
     coarse = (detail * kinds.room_m[each, last]).astype(np.float32)
     whole = coarse.copy()
     if start.shape[1] > 1:
-        spare = np.minimum(NEAR_SPARE * kinds.triangles[:, 1] / kinds.triangles[:, 0], 1.0) ** 0.5
-        whole = np.where(last > 0, start[:, 1] * spare, whole).astype(np.float32)
-    return Switches(start, end, whole, coarse, kinds.count)
+        second = (start <= start[:, 1:2]).sum(axis=1) - 1  # what is drawn after the original
+        second = np.minimum(second, last)
+        spare = NEAR_SPARE * kinds.triangles[each, second] / kinds.triangles[:, 0]
+        whole = np.where(last > 0, start[:, 1] * np.minimum(spare, 1.0) ** 0.5, whole)
+    return Switches(start, end, before, whole.astype(np.float32), coarse, kinds.count)
 
 
 @dataclass(frozen=True, eq=False)
@@ -277,10 +288,10 @@ def chosen(
         share = np.minimum(share, 1)
     fades = np.flatnonzero(share < 1)
     of = np.concatenate([each, fades])
-    drawn = np.concatenate([level, level[fades] - 1])
+    drawn = np.concatenate([level, at.before[kind[fades], level[fades]]])
     comes = np.concatenate([share, share[fades]])
     leaves = np.arange(len(of)) >= len(each)
-    whole = _share_whole(at, kind[of], drawn, away[of])
+    whole = np.ones(len(of)) if held is not None else _share_whole(at, kind[of], drawn, away[of])
     kept, enlarged = whole * WHOLE, whole**-GROWTH
     if held is None:
         enlarged *= _lengths(kinds, kind, at.stage(kind, away))[of]
@@ -312,7 +323,7 @@ def _lengths(kinds: Kinds, kind: np.ndarray, stage: np.ndarray) -> np.ndarray:
     result = np.ones(len(kind))
     for index, (at, factor) in enumerate(kinds.corrections):
         here = np.flatnonzero(kind == index)
-        result[here] = np.interp(stage[here], at, factor, left=1.0)
+        result[here] = np.interp(stage[here], at, factor)
     return result
 
 

@@ -99,7 +99,7 @@ class Forest(OnGpu):
         self.total = int(placement.tiles.count.sum())
         own = np.array([one.height for one in species])
         tallest = placement.tallest(len(species))
-        self._largest: FloatArray = np.where(np.isnan(tallest), 1.0, tallest / own)
+        self._largest: FloatArray = np.fmax(1.0, tallest / own)
         self._landscape: Landscape | None = None
         self._elements: list[list[Elements]] = []
         self._models: list[list[int]] = []
@@ -201,12 +201,16 @@ class Forest(OnGpu):
         found = seen(stocks, near, eye.position, planes, kinds, look.detail)
         if self.fade != "none" or look.level is not None:
             return found, chosen(found, kinds, look.detail, self.fade, look.level), tiles
-        kept = [self._levels_of(int(tile))[:n] for tile, n in zip(tiles, found.counts, strict=True)]
+        kept = [
+            self._levels_of(int(tile), len(stock.rows))[:count]
+            for tile, stock, count in zip(tiles, stocks, found.counts, strict=True)
+        ]
         before = np.concatenate([np.zeros(0, np.uint8), *kept])
         what = chosen(found, kinds, look.detail, self.fade, None, before[found.index])
         before[found.index] = what.level[: len(found.rows)]
-        for part, levels in zip(np.split(before, np.cumsum(found.counts)[:-1]), kept, strict=True):
-            levels[:] = part
+        ends = np.cumsum(found.counts)
+        for levels, end in zip(kept, ends, strict=True):
+            levels[:] = before[end - len(levels) : end]
         return found, what, tiles
 
     def _paint(self, found: Seen, what: Chosen, color: int) -> np.ndarray | None:
@@ -251,8 +255,8 @@ class Forest(OnGpu):
             self._kept -= len(gone.rows)
         return made
 
-    def _levels_of(self, tile: int) -> np.ndarray:
-        """(n,) uint8 the level that each plant of a tile was last drawn at."""
+    def _levels_of(self, tile: int, count: int) -> np.ndarray:
+        """(count,) uint8 the level that each plant of a tile was last drawn at."""
         if tile not in self._levels:
-            self._levels[tile] = np.full(len(self._stocks[tile].rows), NO_LEVEL, np.uint8)
+            self._levels[tile] = np.full(count, NO_LEVEL, np.uint8)
         return self._levels[tile]

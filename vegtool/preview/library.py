@@ -107,6 +107,12 @@ def read_species(path: Path, progress: Progress = silent) -> Species:
         files.append(file)
         levels.append(read_plant(file))
     distances = np.array([level["switch_distance_m"] for level in told["levels"]], np.float64)
+    if distances[0] != 0 or (np.diff(distances) <= 0).any():
+        listed = ", ".join(f"{distance:g}" for distance in distances)
+        raise InputError(
+            f"{path}: expected switch distances that begin with 0 and ascend, found {listed}. "
+            "Convert the plant again."
+        )
     ends = np.array([level["fade_end_m"] for level in told["levels"]], np.float64)
     fade = np.full(len(names), FADE_FRACTION)
     fade[0] = 0.0

@@ -47,11 +47,11 @@ def noise() -> tuple[ByteArray, ...]:
 
 
 def threshold_of(share: FloatArray) -> FloatArray:
-    """The value of the interpolated noise, 0 to 1, below which a share of it lies; -1 for none, 2
+    """The value of the interpolated noise, 0 to 1, below which a share of it lies; 0 for none, 2
     for all."""
     at, values = _quantiles()
     inside = np.interp(share, at, values)
-    return np.where(share <= 0, -1.0, np.where(share >= 1, 2.0, inside))
+    return np.where(share <= 0, 0.0, np.where(share >= 1, 2.0, inside))
 
 
 @cache

@@ -10,24 +10,27 @@ from typing import Any
 import numpy as np
 
 from vegtool.arrays import ByteArray
-from vegtool.gl.context import context
+from vegtool.gl.context import context, framebuffer_kept
 from vegtool.gl.screen import Screen
 from vegtool.preview.eye import Eye
+from vegtool.preview.governor import LONGEST_STEP_S, MEDIAN_FRAMES, Governor
 from vegtool.preview.show import SKY, Show
 from vegtool.progress import Progress, silent
 
-LOADING = 0.5
-"""Of the progress of a run."""
+SETTLING = 256
+"""Frames, at most, until the detail is found at which a rate can be held."""
 
 
 @contextmanager
 def loaded(show: Show, progress: Progress = silent) -> Iterator[Screen]:
     """A show ready to be drawn without a window, and the screen to draw it into."""
     with ExitStack() as stack:
-        screen = stack.enter_context(Screen(context()))
+        ctx = context()
+        stack.enter_context(framebuffer_kept(ctx))
+        screen = stack.enter_context(Screen(ctx))
         stack.callback(show.release)
         for done in show.load(screen.ctx):
-            progress("loading", LOADING * done)
+            progress("loading", done)
         yield screen
 
 
@@ -46,7 +49,29 @@ def frames(
         show.frame(screen.ctx, screen.ctx.fbo, size, 1 / fps if index else 0.0)
         screen.resolve()
         yield screen.read()
-        progress("frames", LOADING + (1 - LOADING) * (index + 1) / len(eyes))
+        progress("frames", (index + 1) / len(eyes))
+
+
+def settle(
+    show: Show,
+    screen: Screen,
+    size: tuple[int, int],
+    eye: Eye,
+    progress: Progress = silent,
+) -> None:
+    """Where frames are held at a time, find the detail at which they are; else nothing."""
+    for index in range(SETTLING):
+        governor = show.state.governor
+        if governor is None or (index > MEDIAN_FRAMES and _settled(governor)):
+            break
+        show.look_from(eye)
+        screen.begin(size, SKY)
+        show.frame(screen.ctx, screen.ctx.fbo, size, LONGEST_STEP_S)
+        progress("finding what can be drawn in time", (index + 1) / SETTLING)
+
+
+def _settled(governor: Governor) -> bool:
+    return not governor.correcting or governor.detail == governor.most
 
 
 def timed_frames(
@@ -63,7 +88,7 @@ def timed_frames(
         screen.resolve()
         screen.ctx.finish()
         rows.append(frame_row(show, perf_counter() - started))
-        progress("frames", LOADING + (1 - LOADING) * (index + 1) / len(eyes))
+        progress("frames", (index + 1) / len(eyes))
     return rows
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 
@@ -26,9 +27,20 @@ SKY = (float(BACKGROUND[0]), float(BACKGROUND[1]), float(BACKGROUND[2]))
 PANELS = ("by distance", "in full", "difference")
 
 
+class Keeper(Protocol):
+    """Keeps what the user wants kept of a walk."""
+
+    def picture(self) -> None:
+        """Keep what is shown."""
+
+    def way(self, walked: Sequence[tuple[Eye, float]]) -> None:
+        """Keep a way: the eye at each frame, and when, seconds."""
+
+
 class Show:
     """A client of gl.window: draws the world as the state says, and changes the state as the user
-    says. walked: called with each frame's eye and its time while a way is recorded.
+    says. way: each frame's eye and its time, while a way is recorded. keeper: keeps pictures and
+    ways, or None.
     """
 
     def __init__(self, world: World, state: State, fade: FadeMode = "alpha-test") -> None:
@@ -36,6 +48,8 @@ class Show:
         self.forest = Forest(world.species, world.placement, world.ground, fade)
         self.stats: FrameStats | None = None
         self.way: list[tuple[Eye, float]] = []
+        self.keeper: Keeper | None = None
+        self._pictures = 0
         self._held: set[str] = set()
         self._drag = np.zeros(2)
         self._scroll = 0.0
@@ -112,7 +126,7 @@ class Show:
             if event.pressed:
                 self._held.add(name)
                 if not self.state.recording and name == "r":
-                    self.way = []
+                    self.keep_way()
                 self.state = pressed(self.state, name)
             else:
                 self._held.discard(name)
@@ -123,11 +137,24 @@ class Show:
 
     def moves(self) -> bool:
         """Whether anything goes on by itself."""
-        return bool(self._held & MOVING or self._followed) or self.state.governor is not None
+        going_on = self.state.governor is not None or self.state.recording
+        return bool(self._held & MOVING or self._followed) or going_on
 
     def wants_close(self) -> bool:
-        """Whether the user has enough."""
+        """Whether the user has enough; what is to be kept of the last frame is kept before."""
+        if self.stats is not None and self.keeper is not None:
+            if self.state.screenshots != self._pictures:
+                self._pictures = self.state.screenshots
+                self.keeper.picture()
+            if not self.state.recording:
+                self.keep_way()
         return self.state.closing
+
+    def keep_way(self) -> None:
+        """Keep what was recorded, if anything was and is not kept yet."""
+        way, self.way = self.way, []
+        if way and self.keeper is not None:
+            self.keeper.way(way)
 
     def release(self) -> None:
         """Free everything on the GPU."""

@@ -30,7 +30,8 @@ FIRST_DETAIL = 1 / 16
 class State:
     """camera: what moves the eye. target: (3,) metres, what is orbited about. sun: None for the
     usual light. detail: factor of all distances, where no governor sets it. level: the level that
-    is held, or None. governor: what holds the frame time, or None.
+    is held, or None. governor: what holds the frame time, or None. flight: how the eye flew before
+    it orbited.
     """
 
     camera: Fly | Orbit
@@ -47,6 +48,7 @@ class State:
     screenshots: int = 0
     closing: bool = False
     governor: Governor | None = None
+    flight: Fly | None = None
 
     @property
     def eye(self) -> Eye:
@@ -94,8 +96,10 @@ def toggled(name: str) -> Callable[[State], State]:
 
 def _other_camera(state: State) -> State:
     if isinstance(state.camera, Fly):
-        return replace(state, camera=orbiting(state.eye, state.target))
-    return replace(state, camera=flying(state.eye))
+        return replace(state, camera=orbiting(state.eye, state.target), flight=state.camera)
+    if state.flight is None:
+        return replace(state, camera=flying(state.eye))
+    return replace(state, camera=replace(state.flight, eye=state.eye))
 
 
 def _sun_by(azimuth: float, elevation: float) -> Callable[[State], State]:

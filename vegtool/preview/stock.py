@@ -48,10 +48,8 @@ def stocked(plants: Plants, species: Sequence[Species], thinned_m: FloatArray) -
     rows = np.zeros(count, STOCK)
     rows["offset"] = plants.offset
     own = np.array([one.height for one in species], np.float64)
-    tall = np.where(np.isfinite(plants.height), plants.height, own[kind]) / np.maximum(
-        own[kind], 1e-9
-    )
-    rows["scale"] = tall
+    times = plants.height / np.maximum(own[kind], 1e-9)
+    rows["scale"] = np.where(np.isfinite(plants.height), times, 1.0)
     rows["turn"] = np.stack([np.cos(plants.yaw), np.sin(plants.yaw)], axis=1)
     rows["species"] = kind
     rows["tint"] = 255

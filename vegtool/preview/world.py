@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import radians, tan
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from vegtool.errors import InputError, UsageError
 from vegtool.formats import ReadOptions
 from vegtool.gl.landscape import GroundMesh
 from vegtool.lighting.light import Sun
-from vegtool.preview.eye import FOV_Y_DEG, Eye, towards
+from vegtool.preview.eye import FAR_M, FOV_Y_DEG, NEAR_M, Eye, towards
 from vegtool.preview.library import MANIFEST, Species, read_library
 from vegtool.progress import Progress, silent
 from vegtool.scene import Scene, read_scene
@@ -31,16 +31,21 @@ EYE_M = 1.7
 """Height of a walker's eye above the ground."""
 AROUND = 60.0
 """Of plants in a row, sizes of the ground around them: its edge is hardly told from a horizon."""
+SUNK = 1e-3
+"""Of its size, how far the ground is below plants in a row: what lies flat on it is seen."""
 FILLED = 0.85
 """Of the picture, by what is looked at as a whole: a row, or a stand."""
-ROOTED = 0.1
-"""Of its height, how far from its file's origin the lowest point of a plant is that stands."""
+ROOTED, BESIDE = 0.1, 1.0
+"""Of its size, how far below or above the origin of its file a plant that stands there may begin,
+and how far beside it its middle may be."""
+FLAT = 1e-3
+"""Of its size: a plant of no more height cannot be made as high as it is to be."""
 ASPECT = 4 / 3
 """Of pictures that the eye's first place is chosen for."""
 STAND_M = 60.0
 """A landscape of less is looked at from outside."""
-MARGIN_M = 100.0
-"""Around plants, where nobody says how far the ground goes."""
+MARGIN_M = 1000.0
+"""Of flat ground, around its extent and all plants: whoever goes there still stands on it."""
 CLEAR_M = 6.0
 """Between the eye's first place, with what is before it, and the nearest crown: enough."""
 SEARCHED_M = 24.0
@@ -129,9 +134,11 @@ def read_world(
     path, scene = parts_of(path, scene)
     if scene is not None:
         return _landscape(path, read_scene(scene), read, progress)
-    if path.is_dir() or path.name.endswith(MANIFEST):
+    converted = path.is_dir() or path.name.endswith(MANIFEST)
+    if converted:
         _check_reading(read, path)
-    return _row(read_library(path, read, progress))
+    species = read_library(path, read, progress)
+    return replace(_row(species), notes=() if converted else tuple(_notes_on(species[0])))
 
 
 def _check_reading(read: ReadOptions, path: Path) -> None:
@@ -143,14 +150,14 @@ def _check_reading(read: ReadOptions, path: Path) -> None:
 
 
 def _row(species: Sequence[Species]) -> World:
+    species = [_placed(one)[0] for one in species]
     low, high = (np.array([one.levels[0].bounds[i] for one in species]) for i in (0, 1))
     middle, widths = (low + high) / 2, np.ptp([low, high], axis=0)[:, [0, 2]].max(axis=1)
     ends = np.cumsum(SPACE * widths)
-    foot = -middle  # a plant may be anywhere in its file
+    foot = np.zeros_like(low)
+    foot[:, [0, 2]] = -middle[:, [0, 2]]
     foot[:, 0] += ends - SPACE * widths / 2 - ends[-1] / 2
-    rooted = np.abs(low[:, 1]) < ROOTED * (high - low)[:, 1]
-    foot[:, 1] = np.where(rooted, 0.0, -low[:, 1])
-    top = float((high[:, 1] + foot[:, 1]).max())
+    top = float(high[:, 1].max())
     size = max(float(ends[-1]), top, 1e-6)
     target = np.array([0.0, top / 2, 0.0])
     depth = float((high - low)[:, 2].max())
@@ -158,9 +165,9 @@ def _row(species: Sequence[Species]) -> World:
     aside = np.array([0.22, 0.11, 0.97])  # of unit length
     eye = target + aside * away
     yaw, pitch = towards(target - eye)
-    near = min(0.1, size / 100)
-    terrain = Terrain("plane", extent=np.full(2, AROUND * size))
-    start = Eye(eye, yaw, pitch, FOV_Y_DEG, near_m=near)
+    near, far = max(min(NEAR_M, size / 100), size / 1000), max(FAR_M, 10 * AROUND * size)
+    terrain = Terrain("plane", extent=np.full(2, AROUND * size), base=-SUNK * size)
+    start = Eye(eye, yaw, pitch, FOV_Y_DEG, near, far)
     return World(
         tuple(species), Row(foot, float(ends[-1])), terrain, _ground(terrain, 1), start, target
     )  # fmt: skip
@@ -183,8 +190,22 @@ def _landscape(path: Path, scene: Scene, read: ReadOptions, progress: Progress) 
     for source, table in zip(sources, scene.species, strict=True):
         progress(f"plants: {table.name or source.name}", (1 + len(species) / len(sources)) / 2)
         (one,) = read_library(source, read)
-        species.append(one)
-        notes += _notes_on(one, source)
+        placed, away = _placed(one)
+        low, high = placed.levels[0].bounds
+        if not high[1] > FLAT * (high - low).max():
+            raise InputError(
+                f"{source}: expected a plant that has a height, y up, found one that is flat: "
+                f"{high[1]:.3g} m high. Where another axis is up, convert it with --up"
+            )
+        species.append(placed)
+        if not source.name.endswith(MANIFEST):
+            notes.append(f"{source}: has no levels of detail; vegtool convert makes them")
+            notes += _notes_on(one)
+        if away:
+            notes.append(
+                f"{source}: is {away:,.1f} m away from the origin of its file; what is placed is "
+                "its middle, on the ground"
+            )
     tiles = placement.tiles
     if not len(tiles):
         raise UsageError(
@@ -193,8 +214,10 @@ def _landscape(path: Path, scene: Scene, read: ReadOptions, progress: Progress) 
         )
     start, target = _start(scene, terrain, placement, species)
     low, high = tiles.low.min(axis=0), tiles.high.max(axis=0)
-    reach = 2 * np.maximum(np.abs(low), np.abs(high))[[0, 2]] + 2 * MARGIN_M
-    extent = reach if terrain.extent is None else terrain.extent
+    extent = np.zeros(2) if terrain.extent is None else terrain.extent
+    if terrain.kind == "plane":
+        reach = 2 * np.maximum(np.abs(low), np.abs(high))[[0, 2]]
+        extent = np.maximum(reach, extent) + 2 * MARGIN_M
     ground = None if terrain.kind == "none" else _ground(terrain, CELLS, extent)
     sun = None if scene.light is None else scene.light.sun
     return World(
@@ -249,24 +272,29 @@ def _manifest_in(place: Path, scene: Scene, index: int) -> Path:
     return (named or found)[0]
 
 
-def _notes_on(one: Species, source: Path) -> list[str]:
-    """What is to be known of a plant that is to stand in a landscape."""
-    notes = []
-    if not source.name.endswith(MANIFEST):
-        notes.append(f"{source}: has no levels of detail; vegtool convert makes them")
+def _notes_on(one: Species) -> list[str]:
+    """What was guessed when a model was read."""
+    return [f"{one.files[0]}: {note}" for note in one.levels[0].notes]
+
+
+def _placed(one: Species) -> tuple[Species, float]:
+    """The plant with its foot at the origin, as it is to stand; and how many metres it was off.
+
+    One that is about there already is as it was: a crown may lean, and roots go into the ground.
+    """
     low, high = one.levels[0].bounds
-    beside = float(np.abs((low + high) / 2)[[0, 2]].max())
-    if beside > 1.5 * float((high - low).max()):
-        notes.append(
-            f"{source}: stands {beside:.4g} m beside the origin of its file, and so of where it is "
-            "placed; move it there"
-        )
-    if high[1] <= 0:
-        raise InputError(
-            f"{source}: expected a plant that stands on the origin of its file, found one all of "
-            f"which is below it, by {-high[1]:.4g} m at least; move it up"
-        )
-    return notes
+    size = high - low
+    shift = np.zeros(3)
+    if np.abs(low + high)[[0, 2]].max() / 2 > BESIDE * size.max():
+        shift[[0, 2]] = -(low + high)[[0, 2]] / 2
+    if abs(low[1]) > ROOTED * size.max():
+        shift[1] = -low[1]
+    if not shift.any():
+        return one, 0.0
+    levels = tuple(
+        replace(level, positions=level.positions + shift, branches=None) for level in one.levels
+    )
+    return replace(one, levels=levels), float(np.linalg.norm(shift))
 
 
 def _start(
@@ -277,24 +305,32 @@ def _start(
     low, high = tiles.low.min(axis=0), tiles.high.max(axis=0)
     middle, size = (low + high) / 2, high - low
     fov = camera.fov_y_deg or FOV_Y_DEG
-    own = np.array([one.height for one in species])
+    own, radius = _sizes(species)
     tall = placement.tallest(len(species))
-    tallest = float(np.where(np.isfinite(tall), tall, own).max())
-    middle[1] = float(terrain.height(middle[None, [0, 2]])[0])
-    if max(size[0], size[2]) < STAND_M:
-        away = _fitting(size[0] + tallest, tallest, fov)
-        xz = np.array([middle[0], high[2] + tallest / 2 + away])
+    tall = np.where(np.isfinite(tall), tall, own)
+    tallest, widest = float(tall.max()), 2 * float((radius * tall / own).max())
+    stand = bool(max(size[0], size[2]) < STAND_M)
+    if stand:
+        away = _fitting(size[0] + widest, tallest, fov)
+        xz = np.array([middle[0], high[2] + widest / 2 + away])
     else:
         xz = np.array([middle[0], middle[2] + 0.4 * size[2]])
         xz = _clear(placement, species, xz)
+    if terrain.kind == "heightmap" and terrain.extent is not None:
+        xz = np.clip(xz, -terrain.extent / 2, terrain.extent / 2)
+    middle[1], base = terrain.height(np.stack([middle[[0, 2]], xz]))
+    if terrain.kind == "none":  # plants stand where the inventory says
+        middle[1] = base = low[1]
     above = EYE_M if camera.height_m is None else float(np.mean(camera.height_m))
-    eye = np.array([xz[0], float(terrain.height(xz[None])[0]) + above, xz[1]])
-    if terrain.kind == "none":
-        eye[1] += low[1]
-    pitch = 0.0
-    if max(size[0], size[2]) < STAND_M:
-        _, pitch = towards(middle + np.array([0.0, tallest / 2, 0.0]) - eye)
+    eye = np.array([xz[0], base + above, xz[1]])
+    pitch = towards(middle + np.array([0.0, tallest / 2, 0.0]) - eye)[1] if stand else 0.0
     return Eye(eye, 0.0, pitch, fov), middle
+
+
+def _sizes(species: Sequence[Species]) -> tuple[FloatArray, FloatArray]:
+    """(s,) metres each: heights, and how far crowns reach to the side."""
+    sizes = np.array([np.ptp(one.levels[0].bounds, axis=0) for one in species])
+    return np.array([one.height for one in species]), sizes[:, [0, 2]].max(axis=1) / 2
 
 
 def _clear(placement: Placement, species: Sequence[Species], xz: FloatArray) -> FloatArray:
@@ -302,12 +338,11 @@ def _clear(placement: Placement, species: Sequence[Species], xz: FloatArray) -> 
     tiles = placement.tiles
     reach = SEARCHED_M + 2 * CLEAR_M
     apart = np.maximum(tiles.low[:, [0, 2]] - xz, xz - tiles.high[:, [0, 2]]).max(axis=1)
-    own = np.array([[one.height, np.ptp(one.levels[0].bounds, axis=0)[[0, 2]].max() / 2]
-                    for one in species])  # fmt: skip
+    own_height, own_radius = _sizes(species)
     feet, radii = [np.zeros((0, 2))], [np.zeros(0)]
     for tile in np.flatnonzero(apart < reach):
         plants = placement.plants(int(tile))
-        height, radius = own[plants.species].T
+        height, radius = own_height[plants.species], own_radius[plants.species]
         scale = np.where(np.isfinite(plants.height), plants.height, height) / height
         hides = scale * height > EYE_M / 2
         feet.append((plants.origin + plants.offset)[hides][:, [0, 2]])

@@ -19,7 +19,7 @@ vec3 surface_color(vec2 uv, vec4 vertex_color) {
     color *= filtered(color_map, uv);
 #endif
 #ifdef SOFT_EDGES
-    cover(color.a, alpha_cutoff);
+    if (alpha_cutoff > 0.0) cover(color.a, alpha_cutoff);
 #else
     if (color.a < alpha_cutoff) discard;
 #endif

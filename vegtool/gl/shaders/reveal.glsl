@@ -16,8 +16,10 @@ float noise_at(vec2 uv, sampler2D map) {
 #endif
 
 void reveal(float here) {
-#ifdef SOFT_EDGES
-    cover(shown < 0.0 ? here : -here, -shown);
+#if defined(SOFT_EDGES) && !defined(DITHERED)
+    if (shown == 0.0) samples_shown = 0;
+    else if (shown < 0.0) cover(here, -shown);
+    else cover(-here, -shown);
 #else
     if (shown < 0.0 ? here < -shown : here >= shown) discard;
 #endif
