@@ -142,7 +142,7 @@ def test_a_level_that_covers_too_little_or_too_much_covers_as_much(
 @pytest.mark.parametrize("fade", ["none", "alpha-test", "dither"])
 def test_coverage_is_kept_from_near_to_far(fade: FadeMode) -> None:
     """Of a tree of four levels, each another crown: whole, while they follow each other, and where
-    elements are left out. To 3 % on average, where nothing was corrected 12 % and more; nowhere is
+    elements are left out. To 3 % on average, where nothing was corrected 7 % and more; nowhere is
     it off by more than 11 %, or two pixels."""
     species = tree()
     with loaded(species, fade) as landscape:
@@ -155,7 +155,7 @@ def test_coverage_is_kept_from_near_to_far(fade: FadeMode) -> None:
             assert drawn == pytest.approx(truth, rel=0.11, abs=2), distance
             off.append(abs(drawn / truth - 1))
             before.append(abs(covered(landscape, plain, distance, fade=fade) / truth - 1))
-    assert np.mean(off) < 0.035 and np.mean(before) > 0.1
+    assert np.mean(off) < 0.035 and np.mean(before) > 0.07
 
 
 def test_what_is_told_rises_to_all_and_factors_are_few_and_limited() -> None:

@@ -36,13 +36,14 @@ from vegtool.preview.choice import (
     APPEARING,
     BEYOND,
     GROWTH,
+    HIDDEN,
     LEAST_TRIANGLES,
     NEAR_SPARE,
     NO_LEVEL,
     OVERLAP,
     SHARES,
     TEXTURED,
-    TRIANGLES_A_PIXEL,
+    THINNED_PX,
     WIDEST,
     Chosen,
     Kinds,
@@ -71,7 +72,7 @@ SIZE = (64, 48)
 @dataclass
 class Kind:
     """A species at a detail. start: metres from where each level is used, of a plant of scale 1; a
-    level that is left out has that of the next."""
+    level that is left out has that of the next. fewest: triangles of the last."""
 
     start: list[float]
     fade: list[float]
@@ -79,6 +80,7 @@ class Kind:
     whole: float
     coarse: float
     thinned: float
+    fewest: int
 
     @property
     def last(self) -> int:
@@ -99,12 +101,17 @@ class Kind:
         return min([self.start[level] * (1 + self.fade[level]), *following])
 
 
+def side_with_room(triangles: int) -> float:
+    """Pixels: n = s^2 (s^2)^HIDDEN, solved for s."""
+    return float(triangles ** (1 / (2 + 2 * HIDDEN)))
+
+
 def kind_of(species: Species, detail: float, focal_px: float = FOCAL_PX) -> Kind:
     triangles = [len(level.faces) for level in species.levels]
     side_px = max(np.ptp(species.levels[0].positions, axis=0)) * focal_px
     start = [0.0]
     for level in range(1, len(triangles)):
-        room = side_px * (TRIANGLES_A_PIXEL / triangles[level]) ** 0.5
+        room = side_px / side_with_room(triangles[level])
         textured = [any(m.textures for m in one.materials) for one in species.levels]
         if textured[level - 1] and not textured[level]:
             room *= TEXTURED
@@ -112,7 +119,7 @@ def kind_of(species: Species, detail: float, focal_px: float = FOCAL_PX) -> Kind
         start.append(min(stated, detail * room))
     for level in range(len(start) - 1, 0, -1):  # none starts after what comes after it
         start[level - 1] = min(start[level - 1], start[level])
-    room = side_px * (TRIANGLES_A_PIXEL / triangles[-1]) ** 0.5
+    room = side_px / side_with_room(triangles[-1])
     if len(triangles) > 1 and textured[-2] and not textured[-1]:
         room *= TEXTURED
     coarse = whole = detail * room
@@ -120,8 +127,9 @@ def kind_of(species: Species, detail: float, focal_px: float = FOCAL_PX) -> Kind
         first = min(n for n, of in enumerate(start) if n and of not in start[n + 1 :])
         whole = start[1] * min(NEAR_SPARE * triangles[first] / triangles[0], 1.0) ** 0.5
     opaque = [all(m.alpha_mode == "opaque" for m in one.materials) for one in species.levels]
-    thinned = detail * side_px * (TRIANGLES_A_PIXEL / LEAST_TRIANGLES) ** 0.5
-    return Kind(start, species.fade.tolist(), opaque, whole, coarse, thinned)
+    thinned = detail * side_px / THINNED_PX
+    fades = species.fade.tolist()
+    return Kind(start, fades, opaque, whole, coarse, thinned, triangles[-1])
 
 
 def level_at(kind: Kind, away: float) -> int:
@@ -152,6 +160,8 @@ def drawn_of(
     for number, visible, leaves in levels:
         until = kind.whole if number == 0 else kind.coarse if number == kind.last else inf
         kept = 1.0 if held is not None else min((until / away) ** 2, 1.0)
+        if number == kind.last and held is None:
+            kept = max(kept, min(LEAST_TRIANGLES / kind.fewest, 1.0))
         length = kept**-GROWTH
         shown, solid, fading = 2.0, 1.0, share < 1
         if mode == "dither":
@@ -342,8 +352,8 @@ def test_a_fade_begins_with_one_level_and_ends_with_the_other() -> None:
 
 
 def crowded() -> Species:
-    """Six levels of which three are stated nearly at the same distance. At a detail of 1/4 there is
-    room for the opaque one of them before that."""
+    """Six levels of which three are stated nearly at the same distance. At a detail of 0.15 there
+    is room for the opaque one of them before that."""
     return species_of(
         "crowded", crown(80, 0.16, OPAQUE), crown(36, 0.24, CUT_OUT), crown(18, 0.34, CUT_OUT),
         crown(16, 0.36, OPAQUE), crown(14, 0.38, OPAQUE), crown(3, 0.6, OPAQUE),
@@ -368,7 +378,7 @@ def test_levels_follow_each_other_in_order_at_every_detail(detail: float) -> Non
 
 def test_a_level_that_is_left_out_is_never_drawn() -> None:
     """From near to far, and whichever of the others was drawn before."""
-    species, detail = (crowded(),), 1 / 4
+    species, detail = (crowded(),), 0.15
     made, by_hand = kinds(species), kind_of(crowded(), detail)
     assert by_hand.used == [0, 1, 3, 4, 5] and by_hand.end(3) == by_hand.start[4]
     away = np.exp(np.linspace(np.log(1), np.log(100), 2000))
@@ -765,14 +775,17 @@ def test_what_is_kept_of_the_original_shrinks_while_it_fades() -> None:
 
 
 def test_one_level_at_all_distances_is_kept_as_far_as_there_is_room() -> None:
-    """Of a plant without levels: a triangle for each TRIANGLES_A_PIXEL of its square."""
+    """Of a plant without levels: so many triangles as there is room for in its square, as its side
+    goes with their number to a power."""
     species = (bush(),)
     alone = species_of("alone", species[0].levels[0])
     made = kinds((alone,))
     for away in (2.0, 30.0, 60.0, 120.0):
         found = found_at((alone,), np.array([away]), np.zeros(1, np.int64))
         what = chosen(found, made, 1.0, "alpha-test")
+        faces = len(alone.levels[0].faces)
         side_px = alone.levels[0].extent * FOCAL_PX / away
-        room = min(side_px**2 / len(alone.levels[0].faces), 1.0)
+        room = min((side_px / side_with_room(faces)) ** 2, 1.0)
+        room = max(room, min(LEAST_TRIANGLES / faces, 1.0))
         assert what.kept[0] == pytest.approx(WHOLE * room, rel=1e-3)
         assert what.length[0] == pytest.approx(room**-GROWTH, rel=1e-3)

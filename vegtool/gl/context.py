@@ -90,6 +90,7 @@ def framebuffer_kept(ctx: moderngl.Context) -> Iterator[None]:
     A framebuffer that is released while bound leaves moderngl with a name that GL no longer knows.
     """
     before = ctx.detect_framebuffer()
+    _ = ctx.error  # of a multisampled one it asks more than OpenGL tells
     try:
         yield
     finally:

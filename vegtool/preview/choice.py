@@ -7,9 +7,10 @@ for later levels among themselves. Cook, Halstead, Planck, Ryu (2007): of the ge
 what remains is enlarged.
 
 Levels are used from the distances that their manifest states, or nearer, where time is short: then
-every plant has as many triangles as its picture has room for, the same number to the pixel. Where
-the error of a pixel depends on how many triangles show it, no other way to spend so many triangles
-has less error (Lagrange's condition: the gain of one more is the same everywhere).
+every plant has as many triangles as its picture has room for. Where the error of a pixel depends on
+how many triangles show it, and all are seen, no way to spend so many triangles has less error than
+the same number to each pixel (Lagrange's condition: the gain of one more is the same everywhere).
+But of what is far, most is hidden behind what is near; so smaller pictures have fewer to the pixel.
 
 Tiles are culled first and plants second, both in arrays.
 """
@@ -36,13 +37,17 @@ GROWTH = 0.4
 NEAR_SPARE = 2.0
 """Of the original where its first level takes over: triangles times those of the level. Leaves that
 were left out at random serve worse than triangles that were chosen."""
-TRIANGLES_A_PIXEL = 1.0
-"""Of the square around a plant, at detail 1: more are never drawn of a level."""
+HIDDEN = 0.4
+"""The square around a plant has room for a triangle to the pixel at detail 1, times the power of its
+pixels with this exponent. Of 0, 0.2, 0.4 and 0.8, FLIP at frames of a quarter second was least with
+0.4 (docs/methods/crossfade.md)."""
 TEXTURED = 0.5
 """Where a level without textures follows one with them, it does at this share of the distance: what
 is cut out by alpha takes a processor six times as long as plain triangles of the same pixels."""
 LEAST_TRIANGLES = 2.0
-"""Of a plant, before plants of its kind are left out."""
+"""Of a plant that is drawn."""
+THINNED_PX = 0.5
+"""Size of plants in the picture, at detail 1, from which on some of their kind are left out."""
 WIDEST = 3.0
 """Factor of the width of plants that stand for others."""
 APPEARING = 0.15
@@ -104,10 +109,10 @@ def kinds_of(
     center, radius, thinned = (np.zeros(len(species)) for _ in range(3))
     for i, one in enumerate(species):
         n, plant = len(one.levels), one.levels[0]
-        reach = plant.extent * focal_px * TRIANGLES_A_PIXEL**0.5
+        reach = plant.extent * focal_px
         triangles[i, :n] = [len(e.faces) for e in elements[i]]
         switch[i, :n] = one.switch_m * focal_px / one.focal_px
-        room[i, :n] = reach / np.sqrt(triangles[i, :n])
+        room[i, :n] = reach / side_of(triangles[i, :n])
         textured = np.array([any(m.textures for m in level.materials) for level in one.levels])
         room[i, 1:n] *= np.where(textured[: n - 1] & ~textured[1:], TEXTURED, 1.0)
         fade[i, :n] = one.fade
@@ -119,10 +124,15 @@ def kinds_of(
         center[i] = (low[1] + high[1]) / 2
         side = np.abs(np.stack([low, high])).max(axis=0)
         radius[i] = float(np.hypot(np.hypot(side[0], side[2]), (high[1] - low[1]) / 2))
-        thinned[i] = reach / LEAST_TRIANGLES**0.5
+        thinned[i] = reach / THINNED_PX
     return Kinds(
         switch, room, fade, index, triangles, count, opaque, center, radius, thinned
     )  # fmt: skip
+
+
+def side_of(triangles: FloatArray) -> FloatArray:
+    """(n,) pixels: side of the square around a plant that has room for so many triangles."""
+    return np.asarray(triangles ** (0.5 / (1 + HIDDEN)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,6 +142,7 @@ class Switches:
     start, end: (s, l) metres, of each level's fade; ascending, a level that is left out begins
     where the next one does. before: (s, l) the level that each one follows. whole_m: (s,) metres,
     up to which the original is drawn whole. coarse_m: (s,) metres, up to which the last level is.
+    count: (s,) levels. fewest: (s,) triangles of the last.
     """
 
     start: np.ndarray
@@ -140,6 +151,7 @@ class Switches:
     whole_m: np.ndarray
     coarse_m: np.ndarray
     count: np.ndarray
+    fewest: np.ndarray
 
     def stage(self, kind: np.ndarray, away: np.ndarray) -> np.ndarray:
         """(n,) how far on its way through its levels a plant is, whatever the detail: l to l + 0.5
@@ -182,7 +194,8 @@ def switches(kinds: Kinds, detail: float) -> Switches:
         second = np.minimum(second, last)
         spare = NEAR_SPARE * kinds.triangles[each, second] / kinds.triangles[:, 0]
         whole = np.where(last > 0, start[:, 1] * np.minimum(spare, 1.0) ** 0.5, whole)
-    return Switches(start, end, before, whole.astype(np.float32), coarse, kinds.count)
+    fewest = kinds.triangles[each, last]
+    return Switches(start, end, before, whole.astype(np.float32), coarse, kinds.count, fewest)
 
 
 @dataclass(frozen=True, eq=False)
@@ -315,7 +328,8 @@ def _share_whole(at: Switches, kind: np.ndarray, level: np.ndarray, away: np.nda
     """(m,) of a level's elements, how many are drawn that far away where nothing fades."""
     first, last = level == 0, level == at.count[kind] - 1
     until = np.where(first, at.whole_m[kind], np.where(last, at.coarse_m[kind], np.inf))
-    return np.asarray(np.minimum((until / away) ** 2, 1.0))
+    fewest = np.where(last, np.minimum(LEAST_TRIANGLES / at.fewest[kind], 1.0), 0.0)
+    return np.asarray(np.clip((until / away) ** 2, fewest, 1.0))
 
 
 def _lengths(kinds: Kinds, kind: np.ndarray, stage: np.ndarray) -> np.ndarray:

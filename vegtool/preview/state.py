@@ -21,8 +21,8 @@ COLORS = ("as it is", "by level", "by species", "by overdraw")
 """What plants are coloured by."""
 SUN_STEP_DEG = 5.0
 DETAIL_STEP = 1.1
-LEAST_DETAIL, MOST_DETAIL = 1 / 64, 4.0
-FIRST_DETAIL = 1 / 16
+LEAST_DETAIL, MOST_DETAIL = 1 / 256, 4.0
+FIRST_DETAIL = 1 / 48
 """Where frames are held at a time: what they take is found out from below, not from above."""
 
 
