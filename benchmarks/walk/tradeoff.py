@@ -98,7 +98,7 @@ def plot(found: Sequence[Point]) -> bytes:
                     xytext=(3, -3), textcoords="offset points", va="top", fontsize=8,
                 )  # fmt: skip
             panel.set(xscale="log", xlabel="milliseconds of a frame", title=scene, ylim=(0, None))
-            panel.legend(frameon=False)
+            panel.legend(frameon=False, loc="lower left")
         panels[0].set_ylabel("FLIP; dots: detail 1/64 to 1, crosses: crossed billboards")
         buffer = BytesIO()
         figure.savefig(buffer, format="png", dpi=130)

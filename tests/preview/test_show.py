@@ -103,7 +103,7 @@ def test_each_key_is_told_of_in_figures_or_help(walk: tuple[Show, Screen]) -> No
     for names, text in (
         (("h",), help_text()), (("3",), "level 3 held"), (("v",), "by level"),
         (("v", "v", "v"), "by overdraw"), (("m",), " | ".join(PANELS)), (("r",), "recording: "),
-        (("minus",), "distances x 0.91"),
+        (("minus",), "detail 0.909"),
     ):  # fmt: skip
         show.state = first_state()
         press(show, *names)

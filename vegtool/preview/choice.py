@@ -38,9 +38,9 @@ NEAR_SPARE = 2.0
 """Of the original where its first level takes over: triangles times those of the level. Leaves that
 were left out at random serve worse than triangles that were chosen."""
 HIDDEN = 0.4
-"""The square around a plant has room for a triangle to the pixel at detail 1, times the power of its
-pixels with this exponent. Of 0, 0.2, 0.4 and 0.8, FLIP at frames of a quarter second was least with
-0.4 (docs/methods/crossfade.md)."""
+"""The square around a plant has room for a triangle to the pixel at detail 1, times its pixels to
+this power. Of 0, 0.2, 0.4 and 0.8, FLIP at frames of a quarter second was least with 0.4
+(docs/methods/crossfade.md)."""
 TEXTURED = 0.5
 """Where a level without textures follows one with them, it does at this share of the distance: what
 is cut out by alpha takes a processor six times as long as plain triangles of the same pixels."""

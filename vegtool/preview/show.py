@@ -106,7 +106,7 @@ class Show:
             f"{stats.plants:,} of {stats.total:,} plants, {stats.tiles:,} tiles",
             f"{stats.draws:,} draws, {stats.triangles:,} triangles, {stats.fragments:,} fragments",
             f"{self.forest.texture_bytes / 1e6:.1f} MB of textures",
-            f"distances x {stats.detail:.2f}"
+            f"detail {stats.detail:.3f}"
             + (f", holding {1e3 / state.governor.target_ms:g} fps" if state.governor else ""),
         ]
         if state.level is not None:

@@ -307,7 +307,7 @@ def _start(
     fov = camera.fov_y_deg or FOV_Y_DEG
     own, radius = _sizes(species)
     tall = placement.tallest(len(species))
-    tall = np.where(np.isfinite(tall), tall, own)
+    tall = np.fmax(tall, own)  # those without a height are as tall as their model
     tallest, widest = float(tall.max()), 2 * float((radius * tall / own).max())
     stand = bool(max(size[0], size[2]) < STAND_M)
     if stand:
