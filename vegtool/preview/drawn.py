@@ -21,7 +21,7 @@ from vegtool.lighting.light import Light, Sun
 from vegtool.preview.command import Result, Say, Wanted, as_json, part
 from vegtool.preview.controls import Fly, Orbit, orbiting
 from vegtool.preview.eye import Eye
-from vegtool.preview.governor import Governor
+from vegtool.preview.governor import BEGIN, Governor
 from vegtool.preview.options import FadeMode, PreviewOptions
 from vegtool.preview.path import CameraPath, duration_s, eyes, recorded, written
 from vegtool.preview.run import frames, loaded, settle, summary, timed_frames
@@ -46,9 +46,10 @@ def show_of(world: World, options: PreviewOptions) -> Show:
     else:
         camera = Fly(world.start, ground=world.height_at)
     sun = world.sun if options.sun is None else Sun.read(options.sun)
-    governor = (
-        None if not options.fps else Governor(1e3 / options.fps, LEAST_DETAIL, detail=FIRST_DETAIL)
-    )
+    governor = None
+    if options.fps:  # what is within BEGIN of the target is left as it is, and is to be fast enough
+        target_ms = 1e3 / options.fps / (1 + BEGIN)
+        governor = Governor(target_ms, LEAST_DETAIL, detail=FIRST_DETAIL)
     state = State(camera, world.target, sun=sun, governor=governor)
     return Show(world, state, cast(FadeMode, options.fade))
 

@@ -14,7 +14,7 @@ from vegtool.measure.background import BACKGROUND
 from vegtool.preview.controls import Fly, Input, orbiting
 from vegtool.preview.eye import Eye
 from vegtool.preview.forest import IN_FULL, Forest, FrameStats, Look
-from vegtool.preview.governor import step
+from vegtool.preview.governor import BEGIN, step
 from vegtool.preview.options import FadeMode
 from vegtool.preview.state import COLORS, State, help_text, moved, pressed
 from vegtool.preview.world import World
@@ -107,7 +107,11 @@ class Show:
             f"{stats.draws:,} draws, {stats.triangles:,} triangles, {stats.fragments:,} fragments",
             f"{self.forest.texture_bytes / 1e6:.1f} MB of textures",
             f"detail {stats.detail:.3f}"
-            + (f", holding {1e3 / state.governor.target_ms:g} fps" if state.governor else ""),
+            + (
+                f", holding {1e3 / state.governor.target_ms / (1 + BEGIN):.3g} fps"
+                if state.governor
+                else ""
+            ),
         ]
         if state.level is not None:
             lines.append(f"level {state.level} held")
