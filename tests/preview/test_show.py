@@ -17,7 +17,7 @@ from vegtool.gl.window import Drag, Key, Resize, Scroll, headless_picture, open_
 from vegtool.gl.window_client import Event
 from vegtool.preview.controls import Fly, Orbit, orbiting
 from vegtool.preview.eye import Eye
-from vegtool.preview.governor import Governor
+from vegtool.preview.governor import BEGIN, Governor
 from vegtool.preview.run import frames, loaded
 from vegtool.preview.show import MOVING, PANELS, SKY, Show
 from vegtool.preview.state import KEYS, State, help_text
@@ -315,7 +315,7 @@ def test_any_size_down_to_a_pixel(walk: tuple[Show, Screen]) -> None:
 def test_a_governor_that_has_no_time_leaves_out_detail(walk: tuple[Show, Screen]) -> None:
     """A hundred-thousandth of a millisecond a frame: distances fall, as fast as they may."""
     show, screen = walk
-    show.state = replace(show.state, governor=Governor(1e-5))
+    show.state = replace(show.state, governor=Governor(1e-5 / (1 + BEGIN)))
     assert show.moves()
     details = []
     for _ in range(12):
