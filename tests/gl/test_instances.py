@@ -23,6 +23,7 @@ from vegtool.gl import upload
 from vegtool.gl.context import framebuffer_kept
 from vegtool.gl.draw import begin, draw
 from vegtool.gl.instances import (
+    GROWING,
     INSTANCE,
     OVERDRAW_STEP,
     WHOLE,
@@ -43,8 +44,6 @@ pytestmark = pytest.mark.gl
 
 LIGHT = Light(np.array([0.4, 0.7, 1.0]), 0.6, 0.4, 0.2)
 STEP = 1 / 255
-GROWING = 1 - 1 / WHOLE
-"""Of the share that is kept: the elements that are not whole yet."""
 
 
 def leaf_picture(size: int = 32) -> np.ndarray:

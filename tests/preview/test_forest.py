@@ -35,7 +35,7 @@ from vegtool.preview.eye import Eye
 from vegtool.preview.forest import IN_FULL, Forest, FrameStats, Look
 from vegtool.preview.library import Species
 from vegtool.preview.options import FadeMode
-from vegtool.preview.palette import PALETTE
+from vegtool.preview.palette import PALETTE, Color
 from vegtool.srgb import srgb_from_linear
 from vegtool.tiles.placement import Placement
 
@@ -72,7 +72,7 @@ def shown(
     """A frame as a window has it."""
     ctx = context()
     with framebuffer_kept(ctx), Screen(ctx) as screen:
-        screen.begin(size, (0.0, 0.0, 0.0) if look.color == 3 else SKY)
+        screen.begin(size, (0.0, 0.0, 0.0) if look.color == "by overdraw" else SKY)
         stats = forest.draw(eye, size, look)
         screen.resolve()
         return stats, screen.read()
@@ -93,7 +93,7 @@ def walked() -> Iterator[Forest]:
 
 def test_a_landscape_is_what_it_was(walked: Forest) -> None:
     assert_golden("walk", shown(walked, EYE, size=(240, 180))[1])
-    assert_golden("walk_by_level", shown(walked, EYE, Look(color=1), (240, 180))[1])
+    assert_golden("walk_by_level", shown(walked, EYE, Look(color="by level"), (240, 180))[1])
 
 
 def test_the_same_eye_sees_the_same_to_the_bit(walked: Forest) -> None:
@@ -147,22 +147,28 @@ def test_a_level_is_held_of_all(walked: Forest) -> None:
 # -- colours ---------------------------------------------------------------------------------------
 
 
+def painted(frame: np.ndarray, number: int) -> bool:
+    """Whether any pixel is of a colour of the palette under white light."""
+    wanted = np.minimum(255 * srgb_from_linear(PALETTE[number, :3] / 127.5), 255)
+    return bool((np.abs(frame - wanted).max(axis=-1) <= 1.5).any())
+
+
 def test_colours_tell_levels_kinds_and_how_often_a_pixel_is_drawn() -> None:
-    """One plant near and one far, before nothing: colours of the palette under white light."""
-    place = Garden([plants([[-0.9, 0, 0], [1.5, 0, -15]], [0, 1])])
+    """One plant near and left, one far and right, before nothing: colours of the palette under
+    white light. Each is of the other's number by level, so that the two cannot be mistaken."""
+    place = Garden([plants([[-0.9, 0, 0], [1.5, 0, -15]], [1, 0])])
     eye = Eye(np.array([0.0, 1.0, 5.0]), fov_y_deg=15.0)
-    with made((tree(), bush()), place) as forest:
+    with made((bush(), tree()), place) as forest:
         found, what, _ = forest.choose(eye, SIZE, Look())
         levels = dict(zip(found.rows["species"], what.level[: len(found.rows)], strict=True))
-        assert (levels[0], levels[1]) == (0, 1)
-        for color, numbers in ((1, levels), (2, {0: 0, 1: 1})):
+        assert (levels[1], levels[0]) == (0, 1)
+        numbers: dict[Color, tuple[int, int]] = {"by level": (0, 1), "by species": (1, 0)}
+        for color, (left, right) in numbers.items():
             _, frame = shown(forest, eye, Look(AMBIENT, color=color))
-            colours = {tuple(c) for c in frame.reshape(-1, 3).tolist()}
-            for number in numbers.values():
-                wanted = 255 * srgb_from_linear(PALETTE[number, :3] / 127.5)
-                near = [c for c in colours if np.abs(c - np.minimum(wanted, 255)).max() <= 1.5]
-                assert near, f"{color}: {number}"
-        _, frame = shown(forest, eye, Look(AMBIENT, color=3))
+            halves = frame[:, :30], frame[:, -30:]
+            for half, number, other in ((halves[0], left, right), (halves[1], right, left)):
+                assert painted(half, number) and not painted(half, other), color
+        _, frame = shown(forest, eye, Look(AMBIENT, color="by overdraw"))
         steps = {int(v) for v in np.unique(frame[..., 0])}
         assert 0 in steps and len(steps) > 3, "some places are drawn several times"
         assert (frame.max(axis=-1) == frame.min(axis=-1)).all()
@@ -388,7 +394,12 @@ def test_what_was_given_stays(walked: Forest) -> None:
     kept = [arrays_of(level) for one in species for level in one.levels]
     feet = [t.offset.tobytes() + t.tint.tobytes() + t.height.tobytes() for t in place.given]
     with made(species, place, ground=ground()) as forest:
-        for fade_look in (Look(), Look(detail=0.6), Look(color=3), Look(level=1, wireframe=True)):
+        for fade_look in (
+            Look(),
+            Look(detail=0.6),
+            Look(color="by overdraw"),
+            Look(level=1, wireframe=True),
+        ):
             shown(forest, EYE, fade_look)
     assert kept == [arrays_of(level) for one in species for level in one.levels]
     assert feet == [t.offset.tobytes() + t.tint.tobytes() + t.height.tobytes() for t in place.given]

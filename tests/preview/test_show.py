@@ -427,7 +427,7 @@ def keys_arrive() -> None:
     arrived = [event.name for event in client.events if isinstance(event, Key) and event.pressed]
     assert arrived == list(names.values())
     assert state.closing and state.help and state.told and state.compare and state.recording
-    assert isinstance(state.camera, Orbit) and state.color == 1 and state.level == 9
+    assert isinstance(state.camera, Orbit) and state.color == "by level" and state.level == 9
     assert state.screenshots == 1 and state.wireframe
     np.testing.assert_allclose(state.light.unit, before.light.unit, atol=1e-9)
     assert state.detail > 1.05

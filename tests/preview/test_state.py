@@ -12,8 +12,8 @@ from vegtool.lighting.light import Light, Sun
 from vegtool.preview.controls import Fly, Input, Orbit
 from vegtool.preview.eye import Eye
 from vegtool.preview.governor import Governor
+from vegtool.preview.palette import COLORS
 from vegtool.preview.state import (
-    COLORS,
     DETAIL_STEP,
     KEYS,
     LEAST_DETAIL,
@@ -43,7 +43,7 @@ WANTED: dict[str, tuple[str, Callable[[State], bool]]] = {
     "h": ("help", lambda s: s.help),
     "i": ("told", lambda s: not s.told),
     "c": ("camera", lambda s: isinstance(s.camera, Orbit)),
-    "v": ("color", lambda s: COLORS[s.color] == "by level"),
+    "v": ("color", lambda s: s.color == "by level"),
     "x": ("wireframe", lambda s: s.wireframe),
     "m": ("compare", lambda s: s.compare),
     "bracketleft": ("sun", lambda s: round(azimuth(s) - azimuth(flying()), 6) == -SUN_STEP_DEG),
@@ -126,7 +126,7 @@ def test_colours_go_round() -> None:
     for _ in range(2 * len(COLORS)):
         seen.append(state.color)
         state = pressed(state, "v")
-    assert seen == [*range(len(COLORS))] * 2
+    assert seen == [*COLORS] * 2
 
 
 def test_a_level_is_held_until_distances_are_asked_for() -> None:

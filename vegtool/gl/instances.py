@@ -26,8 +26,10 @@ INSTANCE = np.dtype([("place", "f4", 4), ("turn", "f4", 4), ("shown", "f4", 3), 
 of the elements that is kept (WHOLE: all), length of enlarged ones. shown: texels shown, see
 reveal.glsl, a factor of the width, and the share of elements without texels that is shown. tint: 0
 to 255 for linear factors of 0 to 2."""
-WHOLE = 1 / (1 - 0.3)
-"""Share from which on all elements are whole (GROWING in instance.vert)."""
+GROWING = 0.3
+"""Of the share of elements that is kept: those that are not whole yet."""
+WHOLE = 1 / (1 - GROWING)
+"""Share from which on all elements are whole."""
 VERTEX = (
     ("in_position_u", 4), ("in_normal_v", 4), ("in_color", 4), ("in_middle_rank", 4),
     ("in_more", 4), ("in_tangent", 4),
@@ -186,4 +188,5 @@ def instance_program(
         f"OVERDRAW {OVERDRAW_STEP}": view == "overdraw",
     }
     told = [name for name, wanted in defines.items() if wanted]
+    told.append(f"GROWING {GROWING}")
     return program(buffers.ctx, "instance.vert", "instance.frag", *told)

@@ -36,7 +36,7 @@ from vegtool.preview.choice import (
 from vegtool.preview.eye import Eye
 from vegtool.preview.library import Species
 from vegtool.preview.options import FadeMode
-from vegtool.preview.palette import PALETTE
+from vegtool.preview.palette import PALETTE, Color
 from vegtool.preview.reveal import noise
 from vegtool.preview.stock import Stock, stocked
 from vegtool.tiles.placement import Placement
@@ -50,15 +50,19 @@ CALIBRATED_PX = 665.1
 lengths are corrected: distances in pixels are what matters."""
 
 
+VIEWS: dict[Color, View] = {"as it is": "lit", "by overdraw": "overdraw"}
+"""How plants are drawn that are not painted."""
+
+
 @dataclass(frozen=True, eq=False)
 class Look:
     """How a frame is drawn. detail: factor of all distances. level: held for all plants, or None.
-    color: index in state.COLORS."""
+    color: what plants are coloured by."""
 
     light: Light = field(default_factory=Light)
     detail: float = 1.0
     level: int | None = None
-    color: int = 0
+    color: Color = "as it is"
     wireframe: bool = False
 
 
@@ -157,7 +161,7 @@ class Forest(OnGpu):
         found, what, tiles = self.choose(eye, size, look)
         drawn_frame = frame(found, what, self._paint(found, what, look.color))
         chosen_at = perf_counter()
-        view: View = "overdraw" if look.color == 3 else "painted" if look.color else "lit"
+        view = VIEWS.get(look.color, "painted")
         drawn = landscape.draw(
             drawn_frame, eye.shot(*size), look.light, view, wireframe=look.wireframe
         )
@@ -213,10 +217,10 @@ class Forest(OnGpu):
             levels[:] = before[end - len(levels) : end]
         return found, what, tiles
 
-    def _paint(self, found: Seen, what: Chosen, color: int) -> np.ndarray | None:
-        if not color:
+    def _paint(self, found: Seen, what: Chosen, color: Color) -> np.ndarray | None:
+        if color in VIEWS:
             return None
-        which = what.level if color == 1 else found.rows["species"][what.of]
+        which = what.level if color == "by level" else found.rows["species"][what.of]
         return np.asarray(PALETTE[which % len(PALETTE)])
 
     def _tiles_seen(

@@ -1,10 +1,16 @@
-"""Colours that are told apart, for what is coloured by number."""
+"""What plants are coloured by, and colours that are told apart."""
 
 from __future__ import annotations
+
+from typing import Literal, get_args
 
 import numpy as np
 
 from vegtool.srgb import linear_from_srgb
+
+Color = Literal["as it is", "by level", "by species", "by overdraw"]
+"""What plants are coloured by."""
+COLORS: tuple[Color, ...] = get_args(Color)
 
 _SRGB = np.array(
     [

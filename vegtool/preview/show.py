@@ -16,7 +16,8 @@ from vegtool.preview.eye import Eye
 from vegtool.preview.forest import IN_FULL, Forest, FrameStats, Look
 from vegtool.preview.governor import BEGIN, step
 from vegtool.preview.options import FadeMode
-from vegtool.preview.state import COLORS, State, help_text, moved, pressed
+from vegtool.preview.palette import COLORS
+from vegtool.preview.state import State, help_text, moved, pressed
 from vegtool.preview.world import World
 
 MOVING = frozenset({"w", "a", "s", "d", "q", "e", "left", "right", "up", "down"})
@@ -115,8 +116,8 @@ class Show:
         ]
         if state.level is not None:
             lines.append(f"level {state.level} held")
-        if state.color:
-            lines.append(COLORS[state.color])
+        if state.color != COLORS[0]:
+            lines.append(state.color)
         if state.compare:
             lines.append(" | ".join(PANELS))
         if state.recording:
@@ -206,7 +207,8 @@ class Show:
         if self._panels is None:
             self._panels = Panels(ctx)
         part = (max(size[0] // 3, 1), size[1])
-        full = replace(look, detail=IN_FULL, level=0, color=0)
+        look = replace(look, color=COLORS[0])  # what is false cannot be compared
+        full = replace(look, detail=IN_FULL, level=0)
         for index, one in enumerate((look, full)):
             self._panels.begin(index, part, _behind(one))
             drawn = self.forest.draw(self.state.eye, part, one)
@@ -218,4 +220,4 @@ class Show:
 
 
 def _behind(look: Look) -> tuple[float, float, float]:
-    return (0.0, 0.0, 0.0) if COLORS[look.color] == "by overdraw" else SKY
+    return (0.0, 0.0, 0.0) if look.color == "by overdraw" else SKY

@@ -16,9 +16,8 @@ from vegtool.lighting.light import Light, Sun
 from vegtool.preview.controls import Fly, Input, Orbit, fly, flying, orbit, orbiting
 from vegtool.preview.eye import Eye
 from vegtool.preview.governor import Governor
+from vegtool.preview.palette import COLORS, Color
 
-COLORS = ("as it is", "by level", "by species", "by overdraw")
-"""What plants are coloured by."""
 SUN_STEP_DEG = 5.0
 DETAIL_STEP = 1.1
 LEAST_DETAIL, MOST_DETAIL = 1 / 256, 4.0
@@ -39,7 +38,7 @@ class State:
     sun: Sun | None = None
     detail: float = 1.0
     level: int | None = None
-    color: int = 0
+    color: Color = "as it is"
     wireframe: bool = False
     compare: bool = False
     told: bool = True
@@ -124,6 +123,11 @@ def _detail_by(factor: float) -> Callable[[State], State]:
     return act
 
 
+def _next_color(state: State) -> State:
+    following = (COLORS.index(state.color) + 1) % len(COLORS)
+    return replace(state, color=COLORS[following])
+
+
 def _hold(level: int | None) -> Callable[[State], State]:
     return lambda state: replace(state, level=level)
 
@@ -133,7 +137,7 @@ KEYS: tuple[Binding, ...] = (
     Binding("i", "i", "show and hide figures", toggled("told")),
     Binding("c", "c", "fly or orbit", _other_camera),
     Binding("v", "v", "colour as it is, by level, by species, by overdraw",
-            lambda s: replace(s, color=(s.color + 1) % len(COLORS))),
+            _next_color),
     Binding("x", "x", "wireframe", toggled("wireframe")),
     Binding("m", "m", "compare with the plants in full, side by side", toggled("compare")),
     Binding("bracketleft", "[", "sun to the left", _sun_by(-SUN_STEP_DEG, 0.0)),

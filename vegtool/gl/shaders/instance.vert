@@ -7,8 +7,6 @@ uniform float transmission;
 uniform vec3 transmission_tint;
 #endif
 
-const float GROWING = 0.3;  // of the share that is kept: the elements that are not whole yet
-
 uniform mat4 view_projection;
 
 in vec4 in_position_u;
