@@ -5,8 +5,9 @@
     python benchmarks/preview.py --parts truth --stations 3
     python benchmarks/preview.py --record --markdown --figures docs
 
-365,000 plants on 300 x 300 m and 390,000 on 1 x 1 km (walk/scenes.py), 1024 x 768 pixels, 4x
-antialiasing, 4x anisotropy, at eye height along a trail, with plants in reach (walk/path.py).
+365,000 plants on 300 x 300 m, 390,000 on 1 x 1 km, and dense undergrowth (walk/scenes.py), 1024 x 768
+pixels, 4x antialiasing, 4x anisotropy, at eye height along a trail, with plants in reach
+(walk/path.py).
 
 speed: frames per second, plants displayed, vertices and memory, at the rate that is asked for, at
 15 frames per second, at detail 1, of two crossed billboards for every plant, and of all geometry.
@@ -39,7 +40,7 @@ from vegtool.gl.context import describe
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "methods" / "preview.md"
-MARK = "<!-- made by benchmarks/preview.py -->"
+MARK = "<!-- {} made by benchmarks/preview.py -->"
 PARTS = ("speed", "transition", "truth", "tradeoff")
 WITH_TEXTURES = ("broadleaf", "bush")
 """Plants whose transitions are told of as they are converted by default too."""
@@ -131,8 +132,9 @@ def main() -> int:
         "tradeoff": tables.tradeoff_rows(bought),
         "transition": tables.transition_rows(smooth),
     }
-    shown = tables.tables(told | {"transition": tables.transition_summary(smooth)})
-    say(f"\n{shown}\n\n{os.cpu_count()} cores, {describe().renderer}")
+    shown = tables.sections(told | {"transition": tables.transition_summary(smooth)})
+    text = "\n\n".join(shown.values())
+    say(f"\n{text}\n\n{os.cpu_count()} cores, {describe().renderer}")
     if known.figures is not None:
         known.figures.mkdir(parents=True, exist_ok=True)
         (known.figures / "preview_tradeoff.png").write_bytes(tradeoff.plot(bought))
@@ -143,7 +145,8 @@ def main() -> int:
             if rows:
                 record(f"preview_{part}", [about | row for row in rows])
     if known.markdown:
-        written(PAGE, MARK, shown)
+        for part, section in shown.items():
+            written(PAGE, MARK.format(part), section)
     missed = [*asked.missed_of_speed(drawn, describe().software)] if "speed" in parts else []
     missed += asked.missed_of_transition(smooth)
     print(f"\n{len(missed)} missed", *missed, sep="\n")

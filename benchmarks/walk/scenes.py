@@ -1,6 +1,6 @@
 """The landscapes that are walked through, and the plants in them: made by script, and kept.
 
-Both are flat, and their plants are placed procedurally, at the spacing at which all that stand are
+All are flat, and their plants are placed procedurally, at the spacing at which all that stand are
 as many as wanted (WITHIN). A trail leads through them. Plants are samples of vegtool, converted as
 `vegtool convert` does.
 """
@@ -40,6 +40,7 @@ TEXTURED = ConvertOptions()
 WITHIN = 0.002
 """Of the number of plants that is wanted."""
 SEED = 1
+TREES = ("broadleaf", "conifer")
 
 Say = Callable[[str], None]
 
@@ -55,7 +56,7 @@ class Kind:
 @dataclass(frozen=True)
 class Setting:
     """A landscape, and what is asked of a walk through it without a GPU: frames per second, and
-    plants displayed at that rate."""
+    plants displayed at that rate. beside_trail: what does not grow on the trail."""
 
     name: str
     side_m: float
@@ -63,6 +64,7 @@ class Setting:
     kinds: Mapping[str, Kind]
     fps: float
     displayed: int
+    beside_trail: tuple[str, ...] = (*TREES, "bush")
 
 
 SETTINGS = {
@@ -94,9 +96,21 @@ SETTINGS = {
         2.0,
         5_000,
     ),
+    "undergrowth": Setting(
+        "undergrowth",
+        130.0,
+        47_000,
+        {
+            "bush": Kind(0.35, (0.7, 1.3)),
+            "herb": Kind(0.35, (0.3, 0.8)),
+            "grass-clump": Kind(0.30, (0.3, 0.6)),
+        },
+        4.0,
+        0,
+        (),
+    ),
 }
-TREES = ("broadleaf", "conifer")
-BESIDE_TRAIL = (*TREES, "bush")
+"""Undergrowth reaches to the eye's chest wherever it stands: 2.8 plants to the square metre."""
 TRAIL = "trail.png"
 PLANTS = tuple(SETTINGS["forest"].kinds)
 
@@ -192,5 +206,5 @@ def _written(setting: Setting, spacing_m: float) -> str:
         low, high = kind.height_m
         lines += ["", "[[species]]", f'name = "{name}"', f"share = {kind.share:g}"]
         lines += [f"height_m = [{low:g}, {high:g}]"]
-        lines += [f'density = "{TRAIL}"'] * (name in BESIDE_TRAIL)
+        lines += [f'density = "{TRAIL}"'] * (name in setting.beside_trail)
     return "\n".join(lines) + "\n"

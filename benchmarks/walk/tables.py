@@ -135,11 +135,10 @@ def mix(setting: Setting) -> str:
     return f"- {setting.name}: {setting.plants:,} plants on {side}: {', '.join(parts)}"
 
 
-def tables(found: Mapping[str, Sequence[Row]]) -> str:
-    """The text of the page: the landscapes, and a table for each part."""
-    blocks = ["\n".join(mix(setting) for setting in SETTINGS.values())]
-    blocks += [f"{TITLES[part]}\n\n{table(rows)}" for part, rows in found.items() if rows]
-    return "\n\n".join(blocks)
+def sections(found: Mapping[str, Sequence[Row]]) -> dict[str, str]:
+    """The text of the page by part: of the landscapes, and a table for each that was measured."""
+    told = {part: f"{TITLES[part]}\n\n{table(rows)}" for part, rows in found.items() if rows}
+    return {"landscapes": "\n".join(mix(setting) for setting in SETTINGS.values()), **told}
 
 
 def table(rows: Sequence[Row]) -> str:
