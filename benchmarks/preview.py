@@ -5,8 +5,8 @@
     python benchmarks/preview.py --parts truth --stations 3
     python benchmarks/preview.py --record --markdown --figures docs
 
-365,000 plants on 300 x 300 m, 390,000 on 1 x 1 km, and dense undergrowth (walk/scenes.py), 1024 x 768
-pixels, 4x antialiasing, 4x anisotropy, at eye height along a trail, with plants in reach
+365,000 plants on 300 x 300 m, 390,000 on 1 x 1 km, and dense undergrowth (walk/scenes.py), 1024 x
+768 pixels, 4x antialiasing, 4x anisotropy, at eye height along a trail, with plants in reach
 (walk/path.py).
 
 speed: frames per second, plants displayed, vertices and memory, at the rate that is asked for, at

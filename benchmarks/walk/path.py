@@ -42,7 +42,7 @@ def views_of(setting: Setting, world: World, folder: Path) -> list[Eye]:
     found = eyes(path, rate, world.height_at)[:VIEWS]
     trees = feet(setting, world)
     for index, eye in enumerate(found):
-        near = float(np.linalg.norm(trees - eye.position[[0, 2]], axis=1).min())
+        near = np.linalg.norm(trees - eye.position[[0, 2]], axis=1).min(initial=np.inf)
         if near < CLEAR_M:
             raise ValueError(f"{setting.name}: view {index} is {near:.2f} m from a tree")
     return found
