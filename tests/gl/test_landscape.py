@@ -10,7 +10,7 @@ from cards import arrays_of, cards, texture
 from instanced import coverage, facing, frame_of, instance, landscape_of, seen_from
 
 from vegtool.elements import ordered
-from vegtool.gl import targets
+from vegtool.gl import pace, targets
 from vegtool.gl.context import framebuffer_kept
 from vegtool.gl.draw import begin
 from vegtool.gl.instances import INSTANCE, OVERDRAW_STEP, WHOLE, View
@@ -152,6 +152,19 @@ def test_any_number_of_rows_is_drawn() -> None:
             seen = coverage(landscape, frame, facing(4 * side, float(side)), 0)
             covered = np.isin(np.arange(4 * side) % 4, (1, 2))
             np.testing.assert_array_equal(seen, covered[:, None] & covered)
+
+
+@pytest.mark.parametrize("most", [1, 6, 7, 10])
+def test_calls_in_parts_draw_the_same(monkeypatch: pytest.MonkeyPatch, most: int) -> None:
+    """A renderer that holds few triangles: parts of less than an instance, of some, of all."""
+    rng = generator(1, "meadow")
+    rows = [instance(place) for place in rng.uniform(-1.5, 1.5, (5, 3))]
+    with landscape_of(cards(np.zeros(3), 0.3, RED, (0, 1, 1))) as landscape:
+        drawn, whole = drawn_into(landscape, frame_of(*rows))
+        monkeypatch.setattr(pace, "MOST_TRIANGLES", most)
+        again, parts = drawn_into(landscape, frame_of(*rows))
+    assert whole.any() and again == drawn
+    np.testing.assert_array_equal(parts, whole)
 
 
 def test_what_is_far_from_the_origin_is_drawn_as_near_it() -> None:

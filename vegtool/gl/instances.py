@@ -1,8 +1,8 @@
 """A plant on the GPU that is drawn many times at once, each time with as many elements as it needs.
 
 What differs from plant to plant is INSTANCE, a row of a buffer that is written anew for every
-frame; all rows of one program and share are one call. OpenGL 3.3 has no first instance, so the
-buffer is bound with an offset before each.
+frame; all rows of one program and share are one call (more on software renderers: pace.py). OpenGL
+3.3 has no first instance, so the buffer is bound with an offset before each.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy as np
 from vegtool.arrays import FloatArray, IntArray, SingleArray
 from vegtool.elements import Elements
 from vegtool.gl.context import OnGpu
+from vegtool.gl.pace import Pace
 from vegtool.gl.program import program
 from vegtool.gl.upload import MaterialGroup, PlantBuffers
 from vegtool.plant import Plant
@@ -85,7 +86,7 @@ class InstancedPlant(OnGpu):
 
     def draw(
         self, group: MaterialGroup, shader: moderngl.Program, rows: moderngl.Buffer,
-        first: int, count: int, share: float,
+        first: int, count: int, share: float, pace: Pace,
     ) -> int:  # fmt: skip
         """Draw the faces of one material of `count` instances from row `first` of a buffer of
         INSTANCE on, none of which keeps more than `share`; returns how many triangles that is."""
@@ -96,8 +97,12 @@ class InstancedPlant(OnGpu):
             self.ctx.disable(moderngl.CULL_FACE)
         else:
             self.ctx.enable(moderngl.CULL_FACE)
-        array = self._array(shader, rows, first)
-        array.render(vertices=3 * kept, first=3 * self._ranges[group.number][0], instances=count)
+        at_once = max(pace.most // kept, 1)
+        begin, end = 3 * self._ranges[group.number][0], first + count
+        for row in range(first, end, at_once):
+            part = min(at_once, end - row)
+            self._array(shader, rows, row).render(vertices=3 * kept, first=begin, instances=part)
+            pace.sent(part * kept)
         return kept * count
 
     def _kept(self, number: int, share: float) -> int:

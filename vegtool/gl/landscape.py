@@ -24,6 +24,7 @@ from vegtool.gl.instances import (
     View,
     instance_program,
 )
+from vegtool.gl.pace import Pace
 from vegtool.gl.program import program
 from vegtool.gl.targets import drawing_target
 from vegtool.lighting.light import Light
@@ -98,7 +99,7 @@ class Landscape(OnGpu):
         self.fading = "pixels" if pixels_fade else "texels"
         self._noise = _noise_texture(self.ctx, noise)
         self._rows = self.ctx.buffer(reserve=INSTANCE.itemsize * 1024, dynamic=True)
-        self._samples = self.ctx.query(samples=True)
+        self._samples, self._pace = self.ctx.query(samples=True), Pace(self.ctx)
         self._ground = None if ground is None else _Ground(self.ctx, ground)
 
     def add(self, plant: Plant, elements: Elements, *, mipmaps: bool = True) -> int:
@@ -168,7 +169,9 @@ class Landscape(OnGpu):
                     if "noise" in shader:
                         shader["noise"] = NOISE
                 plant.buffers.use(group, shader)
-                drawn = plant.draw(group, shader, self._rows, batch.first, batch.count, batch.share)
+                drawn = plant.draw(
+                    group, shader, self._rows, batch.first, batch.count, batch.share, self._pace
+                )
                 draws += bool(drawn)
                 triangles += drawn
         return draws, triangles
