@@ -32,7 +32,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "measure": {"gl", "lighting"},
     "baselines": {"formats", "baking", "gl", "measure"},
     "refine": {"branches", "clustering", "boxes", "gl", "baking", "lighting", "measure"},
-    "tiles": {"scene", "formats"},
+    "tiles": {"scene", "formats", "baking", "gl", "measure", "refine", "tangents"},
     "convert": {"clustering", "boxes", "gl", "baking", "lighting", "measure", "refine"},
     "batch": {"convert", "formats", "measure"},
     "scene": {"convert", "lighting"},
@@ -55,7 +55,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "__main__": {"cli"},
     "cli": {
         "batch", "console", "convert", "doctor", "flags", "formats", "growth", "inspect",
-        "measure", "outcomes", "preview", "report", "scene", "stability",
+        "measure", "outcomes", "preview", "report", "scene", "stability", "tiles",
     },
 }  # fmt: skip
 

@@ -9,8 +9,8 @@ import pytest
 
 from vegtool.elements import ordered
 from vegtool.gl.landscape import Batch, Frame
-from vegtool.preview.library import Species
 from vegtool.tiles.grid import Grid
+from vegtool.tiles.library import Species
 
 BENCHMARKS = Path(__file__).resolve().parent.parent / "benchmarks"
 

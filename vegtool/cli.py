@@ -25,6 +25,7 @@ from vegtool.formats import ReadOptions
 from vegtool.measure.options import MeasureOptions
 from vegtool.preview.options import PreviewOptions
 from vegtool.report.options import ReportOptions
+from vegtool.tiles.options import TileOptions
 
 app = typer.Typer(
     name="vegtool",
@@ -388,6 +389,41 @@ def preview_command(
     console = Console(-1 if quiet else verbose, json)
     wanted = Wanted(path, scene, camera, out, screenshot, frames, stats, html, force)
     result = run_preview(wanted, preview, read, console.bar, console.say)
+    console.result(result.facts, result.text)
+
+
+@app.command("tiles")
+@flags
+def tiles_command(
+    *,
+    source: Annotated[
+        Path, typer.Argument(help="A scene, or an inventory with a row per plant.", parser=_path)
+    ],
+    species: Annotated[
+        Path,
+        typer.Option(
+            "--species", help="Folder of converted plants.", metavar="FOLDER", parser=_path
+        ),
+    ],
+    out: Out,
+    tiles: TileOptions,
+    json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = 0,
+    config: Config = None,
+) -> None:
+    """Merge a landscape of plants into tiles, each drawn by one call, for 3D Tiles clients.
+
+    [bold]Examples[/bold]
+
+        vegtool tiles trees.csv --species library/ -o tiles/
+
+        vegtool tiles scene.toml --species library/ -o tiles/
+    """
+    from vegtool.tiles.command import run_tiles
+
+    console = Console(-1 if quiet else verbose, json)
+    result = run_tiles(source, species, out, tiles, console.bar, console.say)
     console.result(result.facts, result.text)
 
 

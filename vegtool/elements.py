@@ -100,6 +100,21 @@ def ordered(plant: Plant) -> Elements:
     )
 
 
+def unordered(plant: Plant) -> Elements:
+    """All faces, by material, of a plant of which nothing is ever left out."""
+    order = np.argsort(plant.face_material, kind="stable")
+    count = len(plant.positions)
+    return Elements(
+        np.arange(count, dtype=np.int32),
+        plant.faces[order],
+        plant.face_material[order],
+        np.zeros(len(order)),
+        plant.positions,
+        np.zeros(count),
+        np.zeros(count, bool),
+    )
+
+
 def spread_ranks(middle: FloatArray) -> FloatArray:
     """(n,) from 0 on and below 1, evenly spaced: those of points (n, 3) such that all points below
     any rank are spread evenly over space."""

@@ -25,10 +25,10 @@ from vegtool.formats.gltf import plant_glb
 from vegtool.formats.png import encode
 from vegtool.growth import sample
 from vegtool.measure.pictures import client_plant
-from vegtool.preview.library import Species
 from vegtool.preview.world import World, read_world
 from vegtool.scene import read_scene
 from vegtool.tiles.blue_noise import COUNT
+from vegtool.tiles.library import Species
 from vegtool.tiles.pattern import least_distance
 from vegtool.tiles.placement import Placement, placement_of
 from vegtool.tiles.terrain import terrain_of

@@ -22,9 +22,9 @@ from vegtool.gl.screen import Screen
 from vegtool.preview.choice import frame
 from vegtool.preview.drawn import show_of
 from vegtool.preview.eye import Eye
-from vegtool.preview.forest import IN_FULL, Look
 from vegtool.preview.options import PreviewOptions
 from vegtool.preview.run import loaded, settle
+from vegtool.preview.scenery import IN_FULL, Look
 from vegtool.preview.show import SKY, Show
 from walk.path import evenly, views_of
 from walk.scenes import (

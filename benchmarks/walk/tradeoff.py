@@ -13,7 +13,8 @@ from vegtool.gl.screen import Screen
 from vegtool.measure.background import over
 from vegtool.measure.flip import perceived
 from vegtool.preview.eye import Eye
-from vegtool.preview.forest import Forest, FrameStats, Look
+from vegtool.preview.forest import Forest
+from vegtool.preview.scenery import FrameStats, Look
 from vegtool.preview.show import SKY
 from walk.scenes import SETTINGS
 from walk.speed import CROSSED, LEVELS, SIZE

@@ -29,10 +29,11 @@ from vegtool.measure.background import over
 from vegtool.measure.flip import difference, perceived
 from vegtool.preview.choice import Kinds, kinds_of, switches
 from vegtool.preview.eye import Eye, towards
-from vegtool.preview.forest import CALIBRATED_PX, IN_FULL, Forest, Look
-from vegtool.preview.library import Species, read_library
+from vegtool.preview.forest import CALIBRATED_PX, Forest
 from vegtool.preview.options import FadeMode
+from vegtool.preview.scenery import IN_FULL, Look
 from vegtool.preview.world import Row
+from vegtool.tiles.library import Species, read_library
 from walk.path import HEIGHT_M
 from walk.truth import WHOLE
 

@@ -21,7 +21,8 @@ from vegtool.measure.background import over
 from vegtool.measure.flip import Perceived, difference, perceived
 from vegtool.preview.choice import frame
 from vegtool.preview.eye import Eye
-from vegtool.preview.forest import IN_FULL, Forest, Look
+from vegtool.preview.forest import Forest
+from vegtool.preview.scenery import IN_FULL, Look
 from vegtool.preview.world import World
 from walk.scenes import Say, key_of, with_crossed, with_originals
 from walk.speed import SIZE

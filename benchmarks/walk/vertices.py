@@ -9,7 +9,7 @@ import numpy as np
 
 from vegtool.elements import Elements, ordered
 from vegtool.gl.landscape import Frame
-from vegtool.preview.library import Species
+from vegtool.tiles.library import Species
 
 
 @dataclass(frozen=True, eq=False)

@@ -31,11 +31,11 @@ from vegtool.plant import Material, Plant
 from vegtool.preview.calibrate import ALONG_FADE, LARGEST, corrected, distances
 from vegtool.preview.choice import Correction, Kinds, Seen, chosen, frame, switches
 from vegtool.preview.eye import Eye
-from vegtool.preview.library import Species
 from vegtool.preview.options import FadeMode
 from vegtool.preview.reveal import noise
 from vegtool.preview.stock import STOCK
 from vegtool.seeding import generator
+from vegtool.tiles.library import Species
 
 pytestmark = pytest.mark.gl
 

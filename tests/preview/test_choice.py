@@ -54,11 +54,11 @@ from vegtool.preview.choice import (
     switches,
 )
 from vegtool.preview.eye import Eye
-from vegtool.preview.library import Species
 from vegtool.preview.options import FadeMode
 from vegtool.preview.reveal import noise, threshold_of
 from vegtool.preview.stock import STOCK, Stock
 from vegtool.seeding import generator
+from vegtool.tiles.library import Species
 
 MODES: tuple[FadeMode, ...] = ("none", "alpha-test", "dither")
 DETAILS = (1.0, 0.5, 3.0, 1 / 16)

@@ -32,11 +32,12 @@ from vegtool.gl.landscape import GroundMesh
 from vegtool.gl.screen import Screen
 from vegtool.preview import forest as module
 from vegtool.preview.eye import Eye
-from vegtool.preview.forest import IN_FULL, Forest, FrameStats, Look
-from vegtool.preview.library import Species
+from vegtool.preview.forest import Forest
 from vegtool.preview.options import FadeMode
 from vegtool.preview.palette import PALETTE, Color
+from vegtool.preview.scenery import IN_FULL, FrameStats, Look
 from vegtool.srgb import srgb_from_linear
+from vegtool.tiles.library import Species
 from vegtool.tiles.placement import Placement
 
 pytestmark = pytest.mark.gl

@@ -14,12 +14,12 @@ from vegtool.lighting.light import Light
 from vegtool.preview.command import part
 from vegtool.preview.drawn import BEHIND_M, Keeper, _backdrop, show_of
 from vegtool.preview.eye import Eye
-from vegtool.preview.library import Species
 from vegtool.preview.options import PreviewOptions
 from vegtool.preview.path import read_path
 from vegtool.preview.run import frames, loaded, settle, summary, timed_frames
 from vegtool.preview.show import Show
 from vegtool.preview.world import World, _row
+from vegtool.tiles.library import Species
 
 pytestmark = pytest.mark.gl
 SIZE = (60, 40)

@@ -15,9 +15,9 @@ from vegtool.formats.gltf import plant_glb
 from vegtool.growth import sample
 from vegtool.plant import Plant
 from vegtool.preview.eye import Eye
-from vegtool.preview.library import Species
 from vegtool.preview.world import FILLED, World, _row, read_world
 from vegtool.scene import read_scene
+from vegtool.tiles.library import Species
 from vegtool.tiles.placement import placement_of
 from vegtool.tiles.terrain import terrain_of
 

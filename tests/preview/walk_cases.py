@@ -16,10 +16,10 @@ from vegtool.elements import Elements, ordered
 from vegtool.plant import Material, Plant
 from vegtool.preview.choice import Kinds, kinds_of
 from vegtool.preview.eye import Eye
-from vegtool.preview.library import Species
 from vegtool.preview.stock import Stock, stocked
 from vegtool.preview.world import World
 from vegtool.seeding import generator
+from vegtool.tiles.library import Species
 from vegtool.tiles.placement import Plants, Tiles
 from vegtool.tiles.terrain import Terrain
 

@@ -18,7 +18,7 @@ import vegtool
 ARRAY_BUFFER = 34962
 ELEMENT_ARRAY_BUFFER = 34963
 
-COMPONENT_TYPES = {"u1": 5121, "u2": 5123, "u4": 5125, "f4": 5126}
+COMPONENT_TYPES = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
 ELEMENT_TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 _ALIGNMENT = 4  # bytes: enough for every component type, and what the chunks ask for
 
@@ -32,6 +32,7 @@ class Document:
         }
         self._parts: list[bytes] = []
         self._length = 0
+        self._files: list[dict[str, Any]] = []
 
     def add(self, kind: str, **properties: Any) -> int:
         """Append an object to the array `kind` ("nodes", "meshes", ...); return its index."""
@@ -43,30 +44,37 @@ class Document:
         """Give an object that was added before more properties."""
         self._objects[kind][index].update(properties)
 
-    def add_view(self, data: bytes, target: int | None = None) -> int:
+    def add_view(self, data: bytes, target: int | None = None, stride: int | None = None) -> int:
         """Append bytes as a buffer view that starts at a multiple of four; return its index."""
         padding = -self._length % _ALIGNMENT
         offset = self._length + padding
         self._parts += [bytes(padding), data]
         self._length = offset + len(data)
         view = {"buffer": 0, "byteOffset": offset, "byteLength": len(data)}
-        return self.add("bufferViews", **view, **({"target": target} if target else {}))
+        more = {"target": target, "byteStride": stride}
+        return self.add("bufferViews", **view, **{k: v for k, v in more.items() if v is not None})
 
     def add_accessor(
         self,
         array: npt.NDArray[Any],
-        target: int = ARRAY_BUFFER,
+        target: int | None = ARRAY_BUFFER,
         bounds: bool = False,
         normalized: bool = False,
     ) -> int:
-        """Append an array (n,) or (n, 2..4) of uint8, uint16, uint32 or float32; return its index.
+        """Append an array (n,) or (n, 2..4) of one of COMPONENT_TYPES; return its index.
 
-        `bounds` writes min and max, exactly as stored. Rows must be multiples of four bytes.
+        `bounds` writes min and max, exactly as stored. Rows of vertices that are no multiples of
+        four bytes are filled up to them. target: None for what is neither vertices nor indices.
         """
         little = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("<"))
         width = 1 if little.ndim == 1 else little.shape[1]
+        stored, stride = little, None
+        if target == ARRAY_BUFFER and (size := width * little.itemsize) % _ALIGNMENT:
+            stride = size + -size % _ALIGNMENT
+            stored = np.zeros((len(little), stride // little.itemsize), little.dtype)
+            stored[:, :width] = little.reshape(-1, width)
         accessor: dict[str, Any] = {
-            "bufferView": self.add_view(little.tobytes(), target),
+            "bufferView": self.add_view(stored.tobytes(), target, stride),
             "componentType": COMPONENT_TYPES[little.dtype.str[1:]],
             "count": len(little),
             "type": ELEMENT_TYPES[width],
@@ -79,11 +87,28 @@ class Document:
             accessor["max"] = rows.max(axis=0).tolist()
         return self.add("accessors", **accessor)
 
-    def use_extension(self, name: str) -> None:
-        """List an extension as used (not required)."""
-        used = self._objects.setdefault("extensionsUsed", [])
-        if name not in used:
-            used.append(name)
+    def use_extension(self, name: str, required: bool = False) -> None:
+        """List an extension as used, or as required too."""
+        for kind in ("extensionsUsed", *(["extensionsRequired"] if required else [])):
+            names = self._objects.setdefault(kind, [])
+            if name not in names:
+                names.append(name)
+
+    def add_file(self, uri: str, length: int) -> int:
+        """Append a buffer that is a file of its own, beside this one; return its index."""
+        self._files.append({"uri": uri, "byteLength": length})
+        return len(self._files)
+
+    @property
+    def objects(self) -> dict[str, Any]:
+        """What was added, by kind."""
+        return self._objects
+
+    @property
+    def binary(self) -> bytes:
+        """What buffer views lie in."""
+        binary = b"".join(self._parts)
+        return binary + bytes(-len(binary) % _ALIGNMENT)
 
     def show(self, *nodes: int) -> None:
         """Make a scene of these root nodes the one that clients open with."""
@@ -91,9 +116,8 @@ class Document:
 
     def glb(self) -> bytes:
         """The document as the bytes of a .glb file: the same objects give the same bytes."""
-        binary = b"".join(self._parts)
-        binary += bytes(-len(binary) % _ALIGNMENT)
-        objects = {**self._objects, "buffers": [{"byteLength": len(binary)}]}
+        binary = self.binary
+        objects = {**self._objects, "buffers": [{"byteLength": len(binary)}, *self._files]}
         text = json.dumps(objects, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
         chunk = text.encode(errors="replace")  # half a surrogate pair, from a file or its name
         chunk += b" " * (-len(chunk) % _ALIGNMENT)

@@ -53,6 +53,13 @@ def plant_glb(plant: Plant) -> bytes:
     return writer.document.glb()
 
 
+def plant_document(plant: Plant, name: str) -> Document:
+    """A plant as the objects of a .glb file whose node is called `name`, without its branches."""
+    writer = _Writer(_local_origin(plant.bounds), {})
+    writer.document.show(writer.add_plant(plant, name))
+    return writer.document
+
+
 def level_glb(level: Level, name: str, images: EncodedImages | None = None) -> bytes:
     """One level as a .glb file whose node is called `name`.
 

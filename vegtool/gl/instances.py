@@ -18,7 +18,7 @@ from vegtool.elements import Elements
 from vegtool.gl.context import OnGpu
 from vegtool.gl.pace import Pace
 from vegtool.gl.program import program
-from vegtool.gl.upload import MaterialGroup, PlantBuffers
+from vegtool.gl.upload import MaterialGroup, PlantBuffers, Textures
 from vegtool.plant import Plant
 from vegtool.tangents import tangents
 
@@ -50,7 +50,7 @@ class InstancedPlant(OnGpu):
 
     plant, elements: the same, in order. Positions are uploaded in metres from the plant's own
     origin, its foot. buffers: its textures and materials, with mips that keep
-    coverage; without mipmaps for what is supersampled.
+    coverage; without mipmaps for what is supersampled. shared: as of PlantBuffers.
     """
 
     def __init__(
@@ -59,10 +59,13 @@ class InstancedPlant(OnGpu):
         elements: Elements,
         *,
         mipmaps: bool = True,
+        shared: Textures | None = None,
         ctx: moderngl.Context | None = None,
     ) -> None:
         self.plant, self.elements = plant, elements
-        self.buffers = PlantBuffers(plant, mipmaps=mipmaps, keep_coverage=mipmaps, ctx=ctx)
+        self.buffers = PlantBuffers(
+            plant, mipmaps=mipmaps, keep_coverage=mipmaps, shared=shared, ctx=ctx
+        )
         self.ctx = self.buffers.ctx
         rows, faces = vertex_rows(plant, elements)
         self._vertices = self.ctx.buffer(rows.tobytes())

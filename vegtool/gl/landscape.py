@@ -27,6 +27,7 @@ from vegtool.gl.instances import (
 from vegtool.gl.pace import Pace
 from vegtool.gl.program import program
 from vegtool.gl.targets import drawing_target
+from vegtool.gl.upload import Textures
 from vegtool.lighting.light import Light
 from vegtool.plant import Plant
 
@@ -102,9 +103,19 @@ class Landscape(OnGpu):
         self._samples, self._pace = self.ctx.query(samples=True), Pace(self.ctx)
         self._ground = None if ground is None else _Ground(self.ctx, ground)
 
-    def add(self, plant: Plant, elements: Elements, *, mipmaps: bool = True) -> int:
-        """Upload one more; returns its index. mipmaps: none for what is supersampled."""
-        self.plants.append(InstancedPlant(plant, elements, mipmaps=mipmaps, ctx=self.ctx))
+    def add(
+        self,
+        plant: Plant,
+        elements: Elements,
+        *,
+        mipmaps: bool = True,
+        shared: Textures | None = None,
+    ) -> int:
+        """Upload one more; returns its index. mipmaps: none for what is supersampled. shared: as of
+        PlantBuffers."""
+        self.plants.append(
+            InstancedPlant(plant, elements, mipmaps=mipmaps, shared=shared, ctx=self.ctx)
+        )
         return len(self.plants) - 1
 
     def release(self) -> None:

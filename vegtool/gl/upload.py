@@ -22,6 +22,9 @@ from vegtool.plant import Material, Plant, Texture
 
 Owned = TypeVar("Owned", moderngl.Buffer, moderngl.Texture, moderngl.VertexArray)
 
+Textures = dict[tuple[int, bool, float | None], moderngl.Texture]
+"""By the id of a Texture, whether it is sRGB, and its cutoff."""
+
 SRGB8_ALPHA8 = 0x8C43
 VERTEX_FLOATS = 12
 """Per vertex: position, u, normal, v, colour (4); three vec4, as attributes or as texels. A fourth
@@ -63,6 +66,8 @@ class PlantBuffers(OnGpu):
     mipmaps: give textures mips, as a client does, and leave the colour under alpha 0 as it is.
     keep_coverage: mips of cut-out materials that show as much, which no client makes; of all, a tap
     takes the nearest, which is a quarter faster than the mean of two.
+    shared: textures that several plants have, all with mipmaps or all without; who gives them keeps
+    their images and releases them.
     """
 
     def __init__(
@@ -71,6 +76,7 @@ class PlantBuffers(OnGpu):
         *,
         mipmaps: bool = False,
         keep_coverage: bool = False,
+        shared: Textures | None = None,
         ctx: moderngl.Context | None = None,
     ) -> None:
         self.plant = plant
@@ -81,7 +87,8 @@ class PlantBuffers(OnGpu):
         self.mipmaps, self.keep_coverage = mipmaps, keep_coverage
         mips = moderngl.LINEAR_MIPMAP_NEAREST if keep_coverage else moderngl.LINEAR_MIPMAP_LINEAR
         self._filter = (mips if mipmaps else moderngl.LINEAR, moderngl.LINEAR)
-        self._textures: dict[tuple[int, bool, float | None], moderngl.Texture] = {}
+        self._textures: Textures = {} if shared is None else shared
+        self._shares = shared is not None
         self._owned: list[moderngl.Buffer | moderngl.Texture | moderngl.VertexArray] = []
         self._arrays: dict[moderngl.Program, moderngl.VertexArray] = {}
         self.groups = self._material_groups()
@@ -92,7 +99,8 @@ class PlantBuffers(OnGpu):
             owned.release()
         self._owned.clear()
         self._arrays.clear()
-        self._textures.clear()
+        if not self._shares:
+            self._textures.clear()
 
     @property
     def texture_bytes(self) -> int:
@@ -243,7 +251,7 @@ class PlantBuffers(OnGpu):
                 for level, smaller in enumerate(mip_levels(pixels, srgb, kept), start=1):
                     texture.write(np.ascontiguousarray(smaller), level=level)
             texture.filter = self._filter
-            self._textures[key] = self._own(texture)
+            self._textures[key] = texture if self._shares else self._own(texture)
         return self._textures[key]
 
     def _own(self, made: Owned) -> Owned:

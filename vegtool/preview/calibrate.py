@@ -31,9 +31,9 @@ from vegtool.preview.choice import (
     switches,
 )
 from vegtool.preview.eye import Eye
-from vegtool.preview.library import Species
 from vegtool.preview.options import FadeMode
 from vegtool.preview.stock import STOCK
+from vegtool.tiles.library import Species
 
 TURNS = (3, 16)
 """From how many sides a plant is seen: few where it is large, many where few pixels show it."""

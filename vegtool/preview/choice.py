@@ -26,10 +26,10 @@ from vegtool.arrays import FloatArray, IntArray
 from vegtool.elements import Elements
 from vegtool.gl.instances import INSTANCE, WHOLE
 from vegtool.gl.landscape import Batch, Frame
-from vegtool.preview.library import Species
 from vegtool.preview.options import FadeMode
 from vegtool.preview.reveal import threshold_of
 from vegtool.preview.stock import STOCK, Stock
+from vegtool.tiles.library import Species
 
 GROWTH = 0.4
 """Lengths of elements grow with this power of how many fewer there are (docs/methods/baselines.md:

@@ -17,7 +17,7 @@ from vegtool.progress import Progress
 
 if TYPE_CHECKING:
     from vegtool.preview.path import CameraPath
-    from vegtool.preview.world import World
+    from vegtool.preview.scenery import Place
     from vegtool.scene import Scene
 
 READING = 0.2
@@ -74,8 +74,13 @@ def run_preview(
     if wanted.html is not None:
         with bar("preview"):
             return _write_page(wanted)
+    from vegtool.preview.tile_world import read_tile_world
+    from vegtool.preview.tileset import tileset_at
     from vegtool.preview.world import parts_of, read_world, way_of
 
+    tiles = tileset_at(wanted.path)
+    if tiles is not None:
+        _check_tiles(wanted, options, read)
     folder, file = parts_of(wanted.path, wanted.scene)
     scene, way = None, wanted.camera
     if file is not None:
@@ -94,7 +99,11 @@ def run_preview(
 
         check_display()
     with bar("preview") as progress:
-        world = read_world(folder, file, read, part(progress, 0.0, READING))
+        world: Place
+        if tiles is not None:
+            world = read_tile_world(tiles)
+        else:
+            world = read_world(folder, file, read, part(progress, 0.0, READING))
         _tell(world, options, say)
         from vegtool.preview.drawn import drawn_without_window, shown_in_window
 
@@ -136,6 +145,17 @@ def _check(wanted: Wanted, options: PreviewOptions, read: ReadOptions) -> None:
             check_free(file.parent, [file.name], wanted.force)
 
 
+def _check_tiles(wanted: Wanted, options: PreviewOptions, read: ReadOptions) -> None:
+    """Raise UsageError for what changes nothing about tiles."""
+    if wanted.scene is not None or read != ReadOptions():
+        raise UsageError(
+            f"{wanted.path}: is a tileset, whose plants stand where they do; leave out --scene, "
+            "--unit, --up and --leaf-material"
+        )
+    if options.fade != PreviewOptions().fade:
+        raise UsageError("--fade: tiles follow each other at once; leave it out")
+
+
 def _check_written(wanted: Wanted, path: CameraPath | None, inputs: list[Path]) -> None:
     """Raise UsageError, OutputError and CapabilityError where something may not be written."""
     if wanted.out is not None:
@@ -170,17 +190,12 @@ def _same(file: Path, other: Path) -> bool:
         return False
 
 
-def _tell(world: World, options: PreviewOptions, say: Say) -> None:
+def _tell(world: Place, options: PreviewOptions, say: Say) -> None:
     """What was guessed or left out; and, to those who ask, what each species' levels are."""
     for note in world.notes:
         say(note)
-    focal = world.start.focal_px(options.pixels[1])
-    for one in world.species:
-        levels = [
-            f"{len(level.faces):,} triangles" + (f" from {away:.3g} m" if away else "")
-            for level, away in zip(one.levels, one.switch_m * focal / one.focal_px, strict=True)
-        ]
-        say(f"{one.name}: {', '.join(levels)} ({one.files[0]})", at=1)
+    for detail in world.details(world.start.focal_px(options.pixels[1])):
+        say(detail, at=1)
 
 
 def _write_page(wanted: Wanted) -> Result:

@@ -25,9 +25,9 @@ from vegtool.preview.governor import BEGIN, Governor
 from vegtool.preview.options import FadeMode, PreviewOptions
 from vegtool.preview.path import CameraPath, duration_s, eyes, recorded, written
 from vegtool.preview.run import frames, loaded, settle, summary, timed_frames
+from vegtool.preview.scenery import Place
 from vegtool.preview.show import SKY, Show
 from vegtool.preview.state import FIRST_DETAIL, LEAST_DETAIL, State
-from vegtool.preview.world import Row, World
 from vegtool.progress import Progress
 
 FPS = 30.0
@@ -38,10 +38,10 @@ BEHIND_M = 300.0
 """Of the ground, from the eye on each side: what is seen of it while a window loads."""
 
 
-def show_of(world: World, options: PreviewOptions) -> Show:
+def show_of(world: Place, options: PreviewOptions) -> Show:
     """What is shown of a world at first: plants in a row are orbited, landscapes walked."""
     camera: Fly | Orbit
-    if isinstance(world.placement, Row):
+    if world.orbited:
         camera = orbiting(world.start, world.target)
     else:
         camera = Fly(world.start, ground=world.height_at)
@@ -56,7 +56,7 @@ def show_of(world: World, options: PreviewOptions) -> Show:
 
 def drawn_without_window(
     wanted: Wanted,
-    world: World,
+    world: Place,
     path: CameraPath | None,
     options: PreviewOptions,
     progress: Progress,
@@ -80,7 +80,7 @@ def drawn_without_window(
     return Result(facts, "\n".join(lines))
 
 
-def eyes_of(world: World, path: CameraPath | None) -> list[Eye]:
+def eyes_of(world: Place, path: CameraPath | None) -> list[Eye]:
     """The eye at each frame of a path through a world, or its first one."""
     if path is None:
         return [world.start]
@@ -136,7 +136,7 @@ def _film(
 
 
 def shown_in_window(
-    name: Path, world: World, path: CameraPath | None, options: PreviewOptions, say: Say
+    name: Path, world: Place, path: CameraPath | None, options: PreviewOptions, say: Say
 ) -> Result:
     """Open a window and wait until it is closed. path: the way that is walked at first."""
     show = show_of(world, options)
@@ -205,7 +205,7 @@ class Keeper:
             self._say(f"{what} was not saved: {error}")
 
 
-def _backdrop(world: World, light: Light) -> Backdrop | None:
+def _backdrop(world: Place, light: Light) -> Backdrop | None:
     """The ground around the eye, while the plants are loaded."""
     if world.ground is None:
         return None

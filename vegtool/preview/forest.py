@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
@@ -17,10 +17,8 @@ from vegtool.arrays import FloatArray, Picture
 from vegtool.elements import Elements, ordered
 from vegtool.gl.context import OnGpu
 from vegtool.gl.draw import MSAA
-from vegtool.gl.instances import View
 from vegtool.gl.landscape import GroundMesh, Landscape, picture
 from vegtool.gl.window_client import Context
-from vegtool.lighting.light import Light
 from vegtool.preview.calibrate import corrected
 from vegtool.preview.choice import (
     NO_LEVEL,
@@ -34,52 +32,19 @@ from vegtool.preview.choice import (
     seen,
 )
 from vegtool.preview.eye import Eye
-from vegtool.preview.library import Species
 from vegtool.preview.options import FadeMode
 from vegtool.preview.palette import PALETTE, Color
 from vegtool.preview.reveal import noise
+from vegtool.preview.scenery import AS_IT_IS, VIEWS, FrameStats, Look
 from vegtool.preview.stock import Stock, stocked
+from vegtool.tiles.library import Species
 from vegtool.tiles.placement import Placement
 
 MOST_PLANTS = 2_000_000
 """Plants that are kept: 90 MB."""
-IN_FULL = 1e9
-"""Detail at which every plant is its original, whole."""
 CALIBRATED_PX = 665.1
 """Pixels of a metre at a distance of one metre in pictures of 1024 x 768 and 60 degrees, for which
 lengths are corrected: distances in pixels are what matters."""
-
-
-VIEWS: dict[Color, View] = {"as it is": "lit", "by overdraw": "overdraw"}
-"""How plants are drawn that are not painted."""
-
-
-@dataclass(frozen=True, eq=False)
-class Look:
-    """How a frame is drawn. detail: factor of all distances. level: held for all plants, or None.
-    color: what plants are coloured by."""
-
-    light: Light = field(default_factory=Light)
-    detail: float = 1.0
-    level: int | None = None
-    color: Color = "as it is"
-    wireframe: bool = False
-
-
-@dataclass(frozen=True)
-class FrameStats:
-    """What a frame took. plants: drawn, of `total`; rows: levels drawn, fading plants twice.
-    fragments: of pixels that passed the depth test. seconds: by part."""
-
-    tiles: int
-    plants: int
-    total: int
-    rows: int
-    draws: int
-    triangles: int
-    fragments: int
-    detail: float
-    seconds: dict[str, float] = field(default_factory=dict)
 
 
 class Forest(OnGpu):
@@ -152,7 +117,7 @@ class Forest(OnGpu):
         """On the GPU."""
         return 0 if self._landscape is None else self._landscape.texture_bytes
 
-    def draw(self, eye: Eye, size: tuple[int, int], look: Look = Look()) -> FrameStats:
+    def draw(self, eye: Eye, size: tuple[int, int], look: Look = AS_IT_IS) -> FrameStats:
         """Draw into the framebuffer in use, and wait until that is done."""
         landscape = self._landscape
         if landscape is None:
@@ -182,7 +147,7 @@ class Forest(OnGpu):
         self,
         eye: Eye,
         size: tuple[int, int],
-        look: Look = Look(),
+        look: Look = AS_IT_IS,
         supersample: int = 1,
         samples: int = MSAA,
     ) -> Picture:

@@ -13,12 +13,11 @@ from vegtool.gl.window_client import Context, Drag, Event, Framebuffer, Key, Scr
 from vegtool.measure.background import BACKGROUND
 from vegtool.preview.controls import Fly, Input, orbiting
 from vegtool.preview.eye import Eye
-from vegtool.preview.forest import IN_FULL, Forest, FrameStats, Look
 from vegtool.preview.governor import BEGIN, step
 from vegtool.preview.options import FadeMode
 from vegtool.preview.palette import COLORS
+from vegtool.preview.scenery import IN_FULL, FrameStats, Look, Place
 from vegtool.preview.state import State, help_text, moved, pressed
-from vegtool.preview.world import World
 
 MOVING = frozenset({"w", "a", "s", "d", "q", "e", "left", "right", "up", "down"})
 """Keys that move the eye while they are held."""
@@ -44,9 +43,9 @@ class Show:
     ways, or None.
     """
 
-    def __init__(self, world: World, state: State, fade: FadeMode = "alpha-test") -> None:
+    def __init__(self, world: Place, state: State, fade: FadeMode = "alpha-test") -> None:
         self.world, self.state = world, state
-        self.forest = Forest(world.species, world.placement, world.ground, fade)
+        self.forest = world.scenery(fade)
         self.stats: FrameStats | None = None
         self.way: list[tuple[Eye, float]] = []
         self.keeper: Keeper | None = None

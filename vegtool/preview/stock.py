@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vegtool.arrays import FloatArray
-from vegtool.preview.library import Species
+from vegtool.tiles.library import Species
 from vegtool.tiles.placement import Plants
 
 STOCK = np.dtype(

@@ -15,10 +15,14 @@ from vegtool.formats import ReadOptions
 from vegtool.gl.landscape import GroundMesh
 from vegtool.lighting.light import Sun
 from vegtool.preview.eye import FAR_M, FOV_Y_DEG, NEAR_M, Eye, towards
-from vegtool.preview.library import MANIFEST, Species, read_library
+from vegtool.preview.forest import Forest
+from vegtool.preview.options import FadeMode
+from vegtool.preview.scenery import Scenery
 from vegtool.progress import Progress, silent
 from vegtool.scene import Scene, read_scene
+from vegtool.tiles.library import MANIFEST, Species, read_library
 from vegtool.tiles.placement import Placement, Plants, Tiles, placement_of
+from vegtool.tiles.species import check_reading, notes_on, placed, species_of
 from vegtool.tiles.terrain import Terrain, terrain_of
 
 SPACE = 1.25
@@ -35,11 +39,6 @@ SUNK = 1e-3
 """Of its size, how far the ground is below plants in a row: what lies flat on it is seen."""
 FILLED = 0.85
 """Of the picture, by what is looked at as a whole: a row, or a stand."""
-ROOTED, BESIDE = 0.1, 1.0
-"""Of its size, how far below or above the origin of its file a plant that stands there may begin,
-and how far beside it its middle may be."""
-FLAT = 1e-3
-"""Of its size: a plant of no more height cannot be made as high as it is to be."""
 ASPECT = 4 / 3
 """Of pictures that the eye's first place is chosen for."""
 STAND_M = 60.0
@@ -71,6 +70,27 @@ class World:
     def height_at(self, x: float, z: float) -> float:
         """Metres: of the ground."""
         return float(self.terrain.height(np.array([[x, z]]))[0])
+
+    @property
+    def orbited(self) -> bool:
+        """Whether it is a row of plants."""
+        return isinstance(self.placement, Row)
+
+    def scenery(self, fade: FadeMode) -> Scenery:
+        """What draws it; nothing is uploaded yet."""
+        return Forest(self.species, self.placement, self.ground, fade)
+
+    def details(self, focal_px: float) -> list[str]:
+        """What the levels of each species are."""
+        found = []
+        for one in self.species:
+            away_m = one.switch_m * focal_px / one.focal_px
+            levels = [
+                f"{len(level.faces):,} triangles" + (f" from {away:.3g} m" if away else "")
+                for level, away in zip(one.levels, away_m, strict=True)
+            ]
+            found.append(f"{one.name}: {', '.join(levels)} ({one.files[0]})")
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,21 +156,13 @@ def read_world(
         return _landscape(path, read_scene(scene), read, progress)
     converted = path.is_dir() or path.name.endswith(MANIFEST)
     if converted:
-        _check_reading(read, path)
+        check_reading(read, path)
     species = read_library(path, read, progress)
-    return replace(_row(species), notes=() if converted else tuple(_notes_on(species[0])))
-
-
-def _check_reading(read: ReadOptions, path: Path) -> None:
-    if read != ReadOptions():
-        raise UsageError(
-            f"--unit, --up and --leaf-material say how a model is read; {path} is converted "
-            "already, in metres and y up. Leave them out"
-        )
+    return replace(_row(species), notes=() if converted else tuple(notes_on(species[0])))
 
 
 def _row(species: Sequence[Species]) -> World:
-    species = [_placed(one)[0] for one in species]
+    species = [placed(one)[0] for one in species]
     low, high = (np.array([one.levels[0].bounds[i] for one in species]) for i in (0, 1))
     middle, widths = (low + high) / 2, np.ptp([low, high], axis=0)[:, [0, 2]].max(axis=1)
     ends = np.cumsum(SPACE * widths)
@@ -182,30 +194,9 @@ def _fitting(width: float, height: float, fov_y_deg: float) -> float:
 def _landscape(path: Path, scene: Scene, read: ReadOptions, progress: Progress) -> World:
     terrain = terrain_of(scene)
     placement = placement_of(scene, terrain, TILE_M, lambda s, f: progress(s, f / 2))
-    sources = [_source_of(path, scene, index) for index in range(len(scene.species))]
-    if all(source.name.endswith(MANIFEST) for source in sources):
-        _check_reading(read, path)
-    species: list[Species] = []
-    notes = [*terrain.notes, *placement.notes]
-    for source, table in zip(sources, scene.species, strict=True):
-        progress(f"plants: {table.name or source.name}", (1 + len(species) / len(sources)) / 2)
-        (one,) = read_library(source, read)
-        placed, away = _placed(one)
-        low, high = placed.levels[0].bounds
-        if not high[1] > FLAT * (high - low).max():
-            raise InputError(
-                f"{source}: expected a plant that has a height, y up, found one that is flat: "
-                f"{high[1]:.3g} m high. Where another axis is up, convert it with --up"
-            )
-        species.append(placed)
-        if not source.name.endswith(MANIFEST):
-            notes.append(f"{source}: has no levels of detail; vegtool convert makes them")
-            notes += _notes_on(one)
-        if away:
-            notes.append(
-                f"{source}: is {away:,.1f} m away from the origin of its file; what is placed is "
-                "its middle, on the ground"
-            )
+    found = species_of(scene, path, read, lambda stage, f: progress(stage, (1 + f) / 2))
+    species = found.species
+    notes = [*terrain.notes, *placement.notes, *found.notes]
     tiles = placement.tiles
     if not len(tiles):
         raise UsageError(
@@ -221,80 +212,13 @@ def _landscape(path: Path, scene: Scene, read: ReadOptions, progress: Progress) 
     ground = None if terrain.kind == "none" else _ground(terrain, CELLS, extent)
     sun = None if scene.light is None else scene.light.sun
     return World(
-        tuple(species), placement, terrain, ground, start, target, sun, way_of(scene), tuple(notes)
+        species, placement, terrain, ground, start, target, sun, way_of(scene), tuple(notes)
     )
 
 
 def way_of(scene: Scene) -> Path | None:
     """The file of a scene's camera path."""
     return None if scene.camera.path is None else scene.path.parent / scene.camera.path
-
-
-def _source_of(path: Path, scene: Scene, index: int) -> Path:
-    """The file of a table's species: what was converted under its name or its model's, else its
-    model."""
-    table = scene.species[index]
-    folder = path if path.is_dir() else path.parent
-    place = None if table.model is None else scene.path.parent / table.model
-    if place is not None and place.name.endswith(MANIFEST):
-        return place
-    if place is not None and place.is_dir():
-        return _manifest_in(place, scene, index)
-    names = [table.name, None if place is None else place.stem]
-    converted = [folder / f"{name}{MANIFEST}" for name in names if name is not None]
-    for manifest in converted:
-        if manifest.exists():
-            return manifest
-    if place is None:
-        wanted = converted[0] if converted else folder / f"NAME{MANIFEST}"
-        raise InputError(
-            f"{scene.at('species', index)}: expected a model, or a plant converted under the name "
-            f"of the species, {wanted}; found none. Convert it, or say model = ..."
-        )
-    if not place.exists():
-        raise InputError(
-            f"{scene.at('species', index, 'model')}: expected the model {place}, or the plant "
-            f"converted, {converted[0]}; found neither. Check the names"
-        )
-    return place
-
-
-def _manifest_in(place: Path, scene: Scene, index: int) -> Path:
-    """The manifest of a species in a folder that the scene names."""
-    found = sorted(place.glob(f"*{MANIFEST}"))
-    named = [one for one in found if one.name == f"{scene.species[index].name}{MANIFEST}"]
-    if len(named or found) != 1:
-        names = ", ".join(one.name for one in found) or "no manifest"
-        raise UsageError(
-            f"{scene.at('species', index, 'model')}: expected one plant in {place}, or one of the "
-            f"species' name; found {names}. Name a manifest, NAME{MANIFEST}"
-        )
-    return (named or found)[0]
-
-
-def _notes_on(one: Species) -> list[str]:
-    """What was guessed when a model was read."""
-    return [f"{one.files[0]}: {note}" for note in one.levels[0].notes]
-
-
-def _placed(one: Species) -> tuple[Species, float]:
-    """The plant with its foot at the origin, as it is to stand; and how many metres it was off.
-
-    One that is about there already is as it was: a crown may lean, and roots go into the ground.
-    """
-    low, high = one.levels[0].bounds
-    size = high - low
-    shift = np.zeros(3)
-    if np.abs(low + high)[[0, 2]].max() / 2 > BESIDE * size.max():
-        shift[[0, 2]] = -(low + high)[[0, 2]] / 2
-    if abs(low[1]) > ROOTED * size.max():
-        shift[1] = -low[1]
-    if not shift.any():
-        return one, 0.0
-    levels = tuple(
-        replace(level, positions=level.positions + shift, branches=None) for level in one.levels
-    )
-    return replace(one, levels=levels), float(np.linalg.norm(shift))
 
 
 def _start(

@@ -15,9 +15,9 @@ from vegtool.errors import InputError
 from vegtool.formats import ReadOptions, read_plant
 from vegtool.formats.gltf import plant_glb, write_chain
 from vegtool.lod import FADE_FRACTION, Display, Level, LodChain
-from vegtool.preview import library
-from vegtool.preview.library import MANIFEST, Species, read_library, read_species
 from vegtool.seeding import generator
+from vegtool.tiles import library
+from vegtool.tiles.library import MANIFEST, Species, read_library, read_species
 
 TRIANGLES = generator(0, "triangles").random((8, 3, 3))
 TRIANGLES[..., 1] += 1

@@ -1,0 +1,165 @@
+"""Tiles of a landscape as .glb files: merged groups, and instances of models that tiles share.
+
+Sources: glTF 2.0 specification; KHR_mesh_quantization and EXT_mesh_gpu_instancing (extensions,
+Khronos glTF repository). Textures, and the vertices of instanced models, are files of their own,
+which clients load once. Positions are in metres from the tile's centre.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from vegtool.arrays import FloatArray
+from vegtool.formats.glb import ELEMENT_ARRAY_BUFFER, Document
+from vegtool.formats.shared_model import SharedModel
+from vegtool.lod import Triangles
+
+QUANTIZATION, INSTANCING = "KHR_mesh_quantization", "EXT_mesh_gpu_instancing"
+STEPS = 65535
+"""Of 16 bits: a tile of 64 m has vertices to half a millimetre."""
+SHORT_INDICES = 65535
+"""Vertices; index 65535 itself is reserved for primitive restart."""
+LINEAR, LINEAR_MIPMAP_LINEAR, CLAMP_TO_EDGE = 9729, 9987, 33071
+ROUGHNESS = 0.9
+"""Foliage seen from afar has no highlight of its own."""
+
+
+@dataclass(frozen=True)
+class SheetFiles:
+    """Where a group's textures are, relative to the tile: color and normal (or None); and of its
+    material whether it is drawn from both sides."""
+
+    color: str
+    normal: str | None
+    double_sided: bool
+
+
+def merged_glb(group: Triangles, sheet: SheetFiles, name: str, plain: bool = False) -> bytes:
+    """A merged group: one node, one mesh, one primitive, one material.
+
+    plain: float32 in place of KHR_mesh_quantization.
+    """
+    document = Document()
+    with_tangents = sheet.normal is not None
+    placed: dict[str, list[float]] = {}
+    if plain:
+        attributes = _plain(document, group, with_tangents)
+    else:
+        attributes, placed = _quantized(document, group, with_tangents)
+        document.use_extension(QUANTIZATION, required=True)
+    kind = np.uint16 if len(group.positions) <= SHORT_INDICES else np.uint32
+    primitive = {
+        "attributes": attributes,
+        "indices": document.add_accessor(group.indices.astype(kind), ELEMENT_ARRAY_BUFFER),
+        "material": _material(document, sheet, name),
+    }
+    mesh = document.add("meshes", name=name, primitives=[primitive])
+    document.show(document.add("nodes", name=name, mesh=mesh, **placed))
+    return document.glb()
+
+
+@dataclass(frozen=True, eq=False)
+class Instances:
+    """Plants that are drawn as one model. place: (n, 3) metres. yaw: (n,) radians about +y. scale:
+    (n,). tint: (n, 3) linear factors."""
+
+    model: SharedModel
+    place: FloatArray
+    yaw: FloatArray
+    scale: FloatArray
+    tint: npt.NDArray[np.float32]
+
+
+def instanced_glb(drawn: Sequence[Instances], name: str) -> bytes:
+    """Instances of shared models: a node and a mesh for each model."""
+    document = Document()
+    document.use_extension(INSTANCING, required=True)
+    nodes = []
+    for one in drawn:
+        half = one.yaw / 2
+        rotation = np.zeros((len(half), 4), np.float32)
+        rotation[:, 1], rotation[:, 3] = np.sin(half), np.cos(half)
+        scale = np.repeat(one.scale[:, None], 3, axis=1).astype(np.float32)
+        values = {
+            "TRANSLATION": one.place.astype(np.float32),
+            "ROTATION": rotation,
+            "SCALE": scale,
+            "_COLOR_0": one.tint.astype(np.float32),
+        }
+        attributes = {key: document.add_accessor(v, None) for key, v in values.items()}
+        mesh = one.model.add_to(document)
+        extension = {INSTANCING: {"attributes": attributes}}
+        nodes.append(document.add("nodes", name=one.model.name, mesh=mesh, extensions=extension))
+    document.show(document.add("nodes", name=name, children=nodes))
+    return document.glb()
+
+
+def _plain(document: Document, group: Triangles, with_tangents: bool) -> dict[str, int]:
+    attributes = {
+        "POSITION": document.add_accessor(group.positions.astype(np.float32), bounds=True),
+        "NORMAL": document.add_accessor(group.normals.astype(np.float32)),
+    }
+    if with_tangents:
+        attributes["TANGENT"] = document.add_accessor(group.tangents.astype(np.float32))
+    attributes["TEXCOORD_0"] = document.add_accessor(group.uvs.astype(np.float32))
+    return attributes | _colors(document, group)
+
+
+def _quantized(
+    document: Document, group: Triangles, with_tangents: bool
+) -> tuple[dict[str, int], dict[str, list[float]]]:
+    """Attributes in 8 and 16 bits, and the node's place that undoes it: one factor for all axes, as
+    normals want it."""
+    low, high = group.positions.min(axis=0), group.positions.max(axis=0)
+    step = float((high - low).max()) / STEPS or 1.0
+    positions = np.rint((group.positions - low) / step).astype(np.uint16)
+    attributes = {
+        "POSITION": document.add_accessor(positions, bounds=True),
+        "NORMAL": document.add_accessor(_bytes(group.normals), normalized=True),
+    }
+    if with_tangents:
+        attributes["TANGENT"] = document.add_accessor(_bytes(group.tangents), normalized=True)
+    uvs = np.rint(np.clip(group.uvs, 0, 1) * STEPS).astype(np.uint16)
+    attributes["TEXCOORD_0"] = document.add_accessor(uvs, normalized=True)
+    placed = {"translation": low.tolist(), "scale": [step] * 3}
+    return attributes | _colors(document, group), placed
+
+
+def _bytes(vectors: FloatArray) -> npt.NDArray[np.int8]:
+    return np.rint(np.clip(vectors, -1, 1) * 127).astype(np.int8)
+
+
+def _colors(document: Document, group: Triangles) -> dict[str, int]:
+    if group.colors is None:
+        return {}
+    colors = np.rint(np.clip(group.colors, 0, 1) * 255).astype(np.uint8)
+    return {"COLOR_0": document.add_accessor(colors, normalized=True)}
+
+
+def _material(document: Document, sheet: SheetFiles, name: str) -> int:
+    sampler = document.add(
+        "samplers", magFilter=LINEAR, minFilter=LINEAR_MIPMAP_LINEAR, wrapS=CLAMP_TO_EDGE,
+        wrapT=CLAMP_TO_EDGE,
+    )  # fmt: skip
+
+    def texture(uri: str) -> dict[str, int]:
+        image = document.add("images", uri=uri)
+        return {"index": document.add("textures", source=image, sampler=sampler)}
+
+    more = {} if sheet.normal is None else {"normalTexture": texture(sheet.normal)}
+    return document.add(
+        "materials",
+        name=name,
+        pbrMetallicRoughness={
+            "baseColorTexture": texture(sheet.color), "metallicFactor": 0.0,
+            "roughnessFactor": ROUGHNESS,
+        },
+        alphaMode="MASK",
+        alphaCutoff=0.5,
+        doubleSided=sheet.double_sided,
+        **more,
+    )  # fmt: skip

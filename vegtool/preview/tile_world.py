@@ -1,0 +1,88 @@
+"""A folder of tiles as a place to walk through."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from vegtool.arrays import FloatArray
+from vegtool.gl.landscape import GroundMesh
+from vegtool.lighting.light import Sun
+from vegtool.preview.eye import Eye, towards
+from vegtool.preview.options import FadeMode
+from vegtool.preview.tile_forest import CLIENT_PX, TileForest
+from vegtool.preview.tileset import Tileset, read_tileset
+from vegtool.preview.world import EYE_M, MARGIN_M, STAND_M
+from vegtool.tiles.terrain import Terrain
+
+LEVEL_M = 1.0
+"""Metres between the lowest and the highest feet, up to which the ground is drawn as a plane."""
+OUTSIDE = 1.5
+"""Sizes of a stand, from its middle to the eye."""
+BESIDE_M = 5.0
+"""From the border of a landscape to the eye."""
+
+
+@dataclass(frozen=True, eq=False)
+class TileWorld:
+    """See scenery.Place. Tilesets say nothing of the ground but where feet are."""
+
+    tileset: Tileset
+    start: Eye
+    target: FloatArray
+    ground: GroundMesh | None
+    notes: tuple[str, ...] = ()
+    sun: Sun | None = None
+    way: Path | None = None
+    orbited: bool = False
+
+    def height_at(self, x: float, z: float) -> float:
+        """Metres: of the feet on the smallest tile there."""
+        return _height(self.tileset, np.array([x, z]))
+
+    def scenery(self, fade: FadeMode) -> TileForest:
+        """What draws it; nothing is uploaded yet. Tiles follow each other at once."""
+        return TileForest(self.tileset, self.ground)
+
+    def details(self, focal_px: float) -> list[str]:
+        """From where tiles of each level are drawn."""
+        found, tiles = [], self.tileset
+        for depth in range(int(tiles.depth.max()) + 1):
+            here = tiles.depth == depth
+            away = tiles.error_m[here].max() * focal_px / CLIENT_PX
+            found.append(f"level {depth}: {int(here.sum()):,} tiles, drawn from {away:,.3g} m")
+        return found
+
+
+def read_tile_world(file: Path) -> TileWorld:
+    """The place of a tileset.json. Raises InputError for what is missing or broken."""
+    tiles = read_tileset(file)
+    low, high = tiles.low[0], tiles.high[0]
+    size = high - low
+    middle = (low + high) / 2
+    small = bool(max(size[0], size[2]) < STAND_M)
+    away = OUTSIDE * size.max() if small else size[2] / 2 + BESIDE_M
+    xz = middle[[0, 2]] + np.array([0.0, away])
+    base = _height(tiles, xz)
+    eye = np.array([xz[0], base + EYE_M, xz[1]])
+    target = np.array([middle[0], (base + high[1]) / 2, middle[2]])
+    start = Eye(eye, 0.0, towards(target - eye)[1] if small else 0.0)
+    ground: GroundMesh | None = None
+    notes: tuple[str, ...] = ()
+    feet = tiles.feet_m[0]
+    if feet[1] - feet[0] <= LEVEL_M:
+        extent = 2 * np.maximum(np.abs(low), np.abs(high))[[0, 2]] + 2 * MARGIN_M
+        mesh = Terrain("plane", extent=extent, base=float(feet[0])).mesh(1)
+        ground = GroundMesh(np.zeros(3), *mesh)
+    else:
+        notes = (f"{file}: has no ground, which is for the client to show; none is drawn",)
+    return TileWorld(tiles, start, target, ground, notes)
+
+
+def _height(tiles: Tileset, xz: FloatArray) -> float:
+    low, high = tiles.low[:, [0, 2]], tiles.high[:, [0, 2]]
+    away = np.linalg.norm(np.maximum(0, np.maximum(low - xz, xz - high)), axis=1)
+    nearest = int(np.lexsort((-tiles.depth, np.round(away, 3)))[0])
+    return float(tiles.feet_m[nearest].mean())

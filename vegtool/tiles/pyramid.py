@@ -1,0 +1,153 @@
+"""What tiles are made of: plants, where they stand, and from where each square is seen.
+
+A square takes over from its quarters at FROM times its own side: whatever the level, as many pixels
+of a picture then show a square, and as many squares fill it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from vegtool.arrays import FloatArray
+from vegtool.errors import UsageError
+from vegtool.formats import ReadOptions
+from vegtool.lod import Display
+from vegtool.progress import Progress, silent
+from vegtool.scene import Scene
+from vegtool.tiles.levels import level_at, switches, triangles
+from vegtool.tiles.library import Species
+from vegtool.tiles.options import TileOptions
+from vegtool.tiles.placement import Placement, placement_of
+from vegtool.tiles.quadtree import Node, Quadtree, quadtree_of
+from vegtool.tiles.species import species_of
+from vegtool.tiles.stand import Stand, stand_on
+from vegtool.tiles.terrain import terrain_of
+
+FROM = 1.0
+"""Sides of a square: from where on it is drawn."""
+CLIENT_PX = 16.0
+"""Screen-space error at which clients go on to the next level, unless told otherwise."""
+FINEST = 1
+"""Level: the original is for those who stand before a single plant."""
+NEAREST = 0.5
+"""Sides of a tile: distance that its plants' levels are for, where nothing is nearer."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pyramid:
+    """display: of the client that tiles are made for."""
+
+    placement: Placement
+    species: tuple[Species, ...]
+    tree: Quadtree
+    options: TileOptions
+    display: Display
+    crs: str | None = None
+    notes: tuple[str, ...] = ()
+
+    @cached_property
+    def switch_m(self) -> FloatArray:
+        """(s, l) metres."""
+        return switches(self.species, self.display)
+
+    @cached_property
+    def of_level(self) -> FloatArray:
+        """(s, l) triangles."""
+        return triangles(self.species)
+
+    def from_m(self, height: int) -> float:
+        """Metres from which on squares of a height are drawn."""
+        return FROM * self.tree.side_m * 2.0**height if height else 0.0
+
+    def made_for_m(self, height: int) -> float:
+        """Metres that the levels of the plants are chosen for."""
+        return self.from_m(height) or NEAREST * self.tree.side_m
+
+    def error_m(self, height: int) -> float:
+        """What a client takes a square of that height to be wrong by: CLIENT_PX where it takes
+        over."""
+        return CLIENT_PX / self.display.pixels_per_metre(1.0) * self.from_m(height)
+
+    def instanced(self, height: int) -> bool:
+        """Whether plants are instances of models."""
+        return height < self.options.near
+
+    def stand(self, node: Node) -> Stand:
+        """The plants on a square."""
+        return stand_on(self.placement, self.tree.tiles_of(node), self.species)
+
+    def bounds(self, node: Node) -> FloatArray:
+        """(2, 3) metres in the scene's frame: nothing that stands on the square is outside."""
+        tiles, which = self.placement.tiles, self.tree.tiles_of(node)
+        low, high = tiles.low[which].min(axis=0), tiles.high[which].max(axis=0)
+        return np.stack([low + self._around[0], high + self._around[1]])
+
+    def origin(self, node: Node) -> FloatArray:
+        """(3,) metres in the scene's frame: what a tile's vertices are relative to."""
+        x, z = self.tree.middle(node)
+        low, high = self.bounds(node)[:, 1]
+        return np.array([x, round((low + high) / 2, 3), z])
+
+    @cached_property
+    def largest(self) -> FloatArray:
+        """(s,) scale that no plant of each species is above."""
+        own = np.array([one.height for one in self.species])
+        tallest = self.placement.tallest(len(own))
+        return np.where(np.isfinite(tallest), tallest / own, 1.0)
+
+    @cached_property
+    def _around(self) -> FloatArray:
+        """(2, 3) metres around a foot that no plant is beyond, however it is turned."""
+        found = np.zeros((2, 3))
+        for one, scale in zip(self.species, self.largest, strict=True):
+            bounds = np.array([level.bounds for level in one.levels])
+            low, high = scale * bounds[:, 0].min(axis=0), scale * bounds[:, 1].max(axis=0)
+            side = np.abs(np.stack([low, high]))[:, [0, 2]].max(axis=0)
+            aside = float(np.hypot(*side))
+            found[0] = np.minimum(found[0], [-aside, low[1], -aside])
+            found[1] = np.maximum(found[1], [aside, high[1], aside])
+        return found
+
+    def finest_at(self, height: int) -> list[int]:
+        """The finest level of each species that a square of that height may show."""
+        count = len(self.species)
+        each = Stand(
+            np.zeros((count, 3)), np.arange(count, dtype=np.int32), self.largest, np.zeros(count),
+            np.ones((count, 3), np.float32), np.arange(count),
+        )  # fmt: skip
+        found = level_at(each, self.switch_m, self.made_for_m(height), FINEST)
+        return [int(level) for level in found]
+
+
+def pyramid_of(
+    scene: Scene, library: Path, options: TileOptions, progress: Progress = silent
+) -> Pyramid:
+    """The pyramid of a scene with the plants of a library.
+
+    Raises UsageError and InputError for what is missing or broken.
+    """
+    terrain = terrain_of(scene)
+    placement = placement_of(scene, terrain, options.tile, lambda s, f: progress(s, f / 2))
+    found = species_of(scene, library, ReadOptions(), lambda s, f: progress(s, (1 + f) / 2))
+    if not len(placement.tiles):
+        raise UsageError(
+            f"{scene.path}: expected plants, found none that stands on the ground of the scene. "
+            "Check [placement], and where [[species]] may grow"
+        )
+    tree = quadtree_of(placement.tiles, placement.tile_m)
+    notes = (*terrain.notes, *placement.notes, *found.notes)
+    return Pyramid(placement, found.species, tree, options, Display(), terrain.crs, notes)
+
+
+def used_levels(pyramid: Pyramid, heights: Sequence[int]) -> list[tuple[int, int]]:
+    """Species and levels that squares of these heights may show, in order."""
+    pairs = set()
+    for height in heights:
+        for kind, finest in enumerate(pyramid.finest_at(height)):
+            pairs |= {(kind, level) for level in range(finest, len(pyramid.species[kind].levels))}
+    return sorted(pairs)

@@ -1,0 +1,179 @@
+"""Levels of several plants as one drawing: one material, whose textures show all their pictures.
+
+What has no texture shows a white block in the colours of its vertices, as hybrid levels do
+(lod.level_triangles). Where any level is drawn from one side alone, so is all: what has two sides
+then stands there twice, as in the pairs of quads of a level with different sides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vegtool.arrays import ByteArray, FloatArray, IntArray
+from vegtool.baking.pack import pack
+from vegtool.errors import UsageError
+from vegtool.lod import Triangles
+from vegtool.plant import Material, Plant, Texture
+from vegtool.srgb import linear_from_srgb, srgb_from_linear
+from vegtool.tangents import tangents
+
+GUTTER = 4
+"""Texels between pictures, which go on in it: a client's second mip still keeps them apart."""
+WHITE = 8
+"""Texels: side of the block that has no picture."""
+FLAT = (128, 128, 255, 255)
+"""A normal that points straight out."""
+BRIGHTEST = 1.25
+"""A linear factor that no plant's tint is above (variation.py). Vertex colours are 1 at most, so
+those of merged groups are divided by it, and what a sheet shows is so much brighter."""
+OUTSIDE = 1e-3
+"""Of a picture's side, how far beyond it texture coordinates may lie, by rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """What a merged group is drawn with. Its colours, of pictures and of parts, are BRIGHTEST times
+    those of the levels.
+
+    color: (h, w, 4) uint8, sRGB, straight alpha, cut off at one half. normal: (h, w, 4) uint8
+    tangent space, or None where no level has one. parts: each level as triangles whose texture
+    coordinates are the sheet's. double_sided: of the one material.
+    """
+
+    color: ByteArray
+    normal: ByteArray | None
+    parts: tuple[Triangles, ...]
+    double_sided: bool
+
+    def material(self, name: str) -> Material:
+        """Of everything that is drawn with the sheet."""
+        normal = None if self.normal is None else Texture(f"{name}_normal", self.normal)
+        return Material(
+            name,
+            color_texture=Texture(f"{name}_color", self.color),
+            normal_texture=normal,
+            alpha_mode="mask",
+            double_sided=self.double_sided,
+            role="leaf",
+        )
+
+
+def sheet_of(levels: Sequence[Plant], max_side: int) -> Sheet:
+    """One sheet for these levels, in their order.
+
+    Raises UsageError where the pictures do not fit into a square of `max_side` texels.
+    """
+    textures = list({id(t): t for plant in levels for t in _colors(plant)}.values())
+    sizes = [texture.pixels.shape[1::-1] for texture in textures]
+    packing = pack(np.array([*sizes, (WHITE, WHITE)], np.int32), GUTTER, max_side)
+    if max(packing.width, packing.height) > max_side:
+        raise UsageError(
+            f"--max-texture: expected room for the pictures of {len(levels)} levels, "
+            f"{packing.width} x {packing.height} texels; got {max_side}"
+        )
+    color = np.zeros((packing.height, packing.width, 4), np.uint8)
+    normals = any(m.normal_texture for plant in levels for m in _used(plant))
+    normal = np.full_like(color, FLAT) if normals else None
+    for rect, texture in zip(packing.rect, textures, strict=False):
+        _paste(color, rect, _brighter(texture.pixels))
+    _paste(color, packing.rect[-1], np.full((WHITE, WHITE, 4), 255, np.uint8))
+    place = {id(texture): rect for texture, rect in zip(textures, packing.rect, strict=False)}
+    for plant in levels:
+        for material in _used(plant):
+            of, bumps = material.color_texture, material.normal_texture
+            if normal is not None and of is not None and bumps is not None:
+                _paste(normal, place[id(of)], _resized(bumps.pixels, of.pixels.shape))
+    double_sided = all(m.double_sided for plant in levels for m in _used(plant))
+    size = np.array([packing.width, packing.height], np.float64)
+    parts = tuple(
+        _part(plant, place, packing.rect[-1], size, double_sided, normals) for plant in levels
+    )
+    return Sheet(color, normal, parts, double_sided)
+
+
+def _used(plant: Plant) -> list[Material]:
+    return [plant.materials[index] for index in np.unique(plant.face_material)]
+
+
+def _colors(plant: Plant) -> Iterable[Texture]:
+    return (m.color_texture for m in _used(plant) if m.color_texture is not None)
+
+
+def _brighter(pixels: ByteArray) -> ByteArray:
+    """A picture times BRIGHTEST, in linear light."""
+    light = np.minimum(BRIGHTEST * linear_from_srgb(np.arange(256) / 255), 1.0)
+    table = np.rint(255 * srgb_from_linear(light)).astype(np.uint8)
+    return np.concatenate([table[pixels[..., :3]], pixels[..., 3:]], axis=2)
+
+
+def _paste(into: ByteArray, rect: IntArray, pixels: ByteArray) -> None:
+    """A picture at its place, its outermost texels carried on into the gutter."""
+    x, y, width, height = (int(v) for v in rect)
+    rows = np.clip(np.arange(-GUTTER, height + GUTTER), 0, height - 1)
+    columns = np.clip(np.arange(-GUTTER, width + GUTTER), 0, width - 1)
+    into[y - GUTTER : y + height + GUTTER, x - GUTTER : x + width + GUTTER] = pixels[rows][
+        :, columns
+    ]
+
+
+def _resized(pixels: ByteArray, shape: tuple[int, ...]) -> ByteArray:
+    """A picture as large as another, by nearest texels; of a level both are."""
+    rows, columns = (
+        np.arange(wanted) * have // wanted
+        for wanted, have in zip(shape[:2], pixels.shape[:2], strict=True)
+    )
+    return np.asarray(pixels[rows][:, columns])
+
+
+def _part(
+    plant: Plant,
+    place: dict[int, IntArray],
+    white: IntArray,
+    size: FloatArray,
+    double_sided: bool,
+    with_tangents: bool,
+) -> Triangles:
+    """A level in the sheet's terms."""
+    positions, normals, uvs, colors, faces = [], [], [], [], []
+    first = 0
+    for index in np.unique(plant.face_material):
+        material = plant.materials[index]
+        of_material = plant.faces[plant.face_material == index]
+        vertices, corners = np.unique(of_material, return_inverse=True)
+        corners = corners.reshape(-1, 3)
+        color = np.broadcast_to(material.base_color, (len(vertices), 4)).copy()
+        if plant.colors is not None:
+            color *= plant.colors[vertices]
+        if material.color_texture is None:
+            uv = np.tile((white[:2] + white[2:] / 2) / size, (len(vertices), 1))
+            color = np.minimum(color * BRIGHTEST, 1.0)
+            color[:, 3] = 1.0
+        else:
+            own = plant.uvs[vertices]
+            if own.min() < -OUTSIDE or own.max() > 1 + OUTSIDE:
+                raise UsageError(
+                    f"{plant.source or plant.name}: repeats its textures, which cannot be merged; "
+                    "convert it (vegtool convert), and its levels can"
+                )
+            rect = place[id(material.color_texture)]
+            uv = (rect[:2] + np.clip(own, 0, 1) * rect[2:]) / size
+        sides = [(plant.normals[vertices], corners)]
+        if material.double_sided and not double_sided:
+            sides.append((-plant.normals[vertices], corners[:, ::-1]))
+        for normal, side in sides:
+            positions.append(plant.positions[vertices])
+            normals.append(normal)
+            uvs.append(uv)
+            colors.append(color)
+            faces.append(side + first)
+            first += len(vertices)
+    found = [np.concatenate(v) for v in (positions, normals, uvs, colors)]
+    indices = np.concatenate(faces).astype(np.int32)
+    frame: FloatArray = np.zeros((len(found[0]), 4))
+    if with_tangents:
+        frame, of, indices = tangents(found[0], found[1], found[2], indices)
+        found = [values[of] for values in found]
+    return Triangles(found[0], found[1], frame, found[2], indices.ravel(), found[3])
