@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from vegtool.arrays import FloatArray
 from vegtool.formats.glb import ELEMENT_ARRAY_BUFFER, Document
+from vegtool.formats.gltf_material import UNLIT
 from vegtool.formats.shared_model import SharedModel
 from vegtool.lod import Triangles
 
@@ -31,11 +33,12 @@ ROUGHNESS = 0.9
 @dataclass(frozen=True)
 class SheetFiles:
     """Where a group's textures are, relative to the tile: color and normal (or None); and of its
-    material whether it is drawn from both sides."""
+    material whether it is drawn from both sides, and whether light is in its colours."""
 
     color: str
     normal: str | None
     double_sided: bool
+    unlit: bool = False
 
 
 def merged_glb(group: Triangles, sheet: SheetFiles, name: str, plain: bool = False) -> bytes:
@@ -75,7 +78,9 @@ class Instances:
 
 
 def instanced_glb(drawn: Sequence[Instances], name: str) -> bytes:
-    """Instances of shared models: a node and a mesh for each model."""
+    """Instances of shared models: a node and a mesh for each model. Raises ValueError for none."""
+    if not drawn:
+        raise ValueError("instanced_glb: expected instances")
     document = Document()
     document.use_extension(INSTANCING, required=True)
     nodes = []
@@ -136,7 +141,8 @@ def _bytes(vectors: FloatArray) -> npt.NDArray[np.int8]:
 def _colors(document: Document, group: Triangles) -> dict[str, int]:
     if group.colors is None:
         return {}
-    colors = np.rint(np.clip(group.colors, 0, 1) * 255).astype(np.uint8)
+    # 8 bits would round the linear colour of dark bark by a tenth
+    colors = np.rint(np.clip(group.colors, 0, 1) * STEPS).astype(np.uint16)
     return {"COLOR_0": document.add_accessor(colors, normalized=True)}
 
 
@@ -150,7 +156,12 @@ def _material(document: Document, sheet: SheetFiles, name: str) -> int:
         image = document.add("images", uri=uri)
         return {"index": document.add("textures", source=image, sampler=sampler)}
 
-    more = {} if sheet.normal is None else {"normalTexture": texture(sheet.normal)}
+    more: dict[str, Any] = {}
+    if sheet.normal is not None:
+        more["normalTexture"] = texture(sheet.normal)
+    if sheet.unlit:
+        document.use_extension(UNLIT)
+        more["extensions"] = {UNLIT: {}}
     return document.add(
         "materials",
         name=name,

@@ -322,6 +322,9 @@ def _copied(part: Part, matrices: FloatArray) -> Part:
     linear = matrices[:, :3, :3]
     sign = np.where(np.linalg.det(linear) < 0, -1, 1)
     cofactors = np.cross(linear[:, [1, 2, 0]], linear[:, [2, 0, 1]]) * sign[:, None, None]
+    # of quantised files the scale is tiny, and its square no length that a normal may have
+    largest = np.abs(cofactors).max(axis=(1, 2), keepdims=True)
+    cofactors = np.divide(cofactors, largest, out=cofactors, where=largest > 0)
     with np.errstate(invalid="ignore", over="ignore"):  # broken coordinates, dropped later
         positions = np.einsum("nij,vj->nvi", linear, part.positions) + matrices[:, None, :3, 3]
         normals = None

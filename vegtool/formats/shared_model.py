@@ -7,6 +7,7 @@ tile holds only its instances, and what a client has loaded once it need not loa
 from __future__ import annotations
 
 import json
+import re
 from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any
@@ -62,6 +63,7 @@ class SharedModel:
 
 def shared_model(plant: Plant, name: str, folder: str) -> SharedModel:
     """A plant or a level as files in `folder`, a path from the tiles with a slash at its end."""
+    stem = plain_name(name)
     document = plant_document(plant, name)
     binary, objects = document.binary, deepcopy(document.objects)
     files: dict[str, bytes] = {}
@@ -69,7 +71,7 @@ def shared_model(plant: Plant, name: str, folder: str) -> SharedModel:
         view = objects["bufferViews"][image.pop("bufferView")]
         begin = view["byteOffset"]
         data = binary[begin : begin + view["byteLength"]]
-        file = f"{name}_{number}{ENDINGS[image.pop('mimeType')]}"
+        file = f"{stem}_{number}{ENDINGS[image.pop('mimeType')]}"
         files[file] = data
         image["uri"] = file
     used = {accessor["bufferView"] for accessor in objects["accessors"]}
@@ -90,18 +92,23 @@ def shared_model(plant: Plant, name: str, folder: str) -> SharedModel:
         accessor["bufferView"] = place[accessor["bufferView"]]
     if any("translation" in node for node in objects["nodes"]):
         raise ValueError(f"shared_model {name}: a model far from its origin cannot be instanced")
-    files[f"{name}.bin"] = bytes(kept)
-    files[f"{name}.gltf"] = _alone(objects, name, len(kept))
+    files[f"{stem}.bin"] = bytes(kept)
+    files[f"{stem}.gltf"] = _alone(objects, stem, len(kept))
     for image in objects.get("images", []):
         image["uri"] = folder + image["uri"]
     for kind in ("scene", "scenes", "asset", "nodes"):
         del objects[kind]
-    return SharedModel(name, objects, f"{folder}{name}.bin", len(kept), files)
+    return SharedModel(name, objects, f"{folder}{stem}.bin", len(kept), files)
 
 
-def _alone(objects: dict[str, Any], name: str, length: int) -> bytes:
+def plain_name(name: str) -> str:
+    """A name that is one in every file system, and as a part of a URI."""
+    return re.sub(r"[^A-Za-z0-9_-]", "_", name)
+
+
+def _alone(objects: dict[str, Any], stem: str, length: int) -> bytes:
     """The model as a file of its own, beside its buffer and its pictures."""
-    values = {**objects, "buffers": [{"uri": f"{name}.bin", "byteLength": length}]}
+    values = {**objects, "buffers": [{"uri": f"{stem}.bin", "byteLength": length}]}
     return (json.dumps(values, allow_nan=False, separators=(",", ":")) + "\n").encode()
 
 

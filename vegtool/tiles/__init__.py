@@ -1,6 +1,7 @@
-"""Where plants stand, and the ground that they stand on.
+"""Where plants stand, the ground that they stand on, and the tiles that they are merged into.
 
 `terrain_of(scene)` reads the ground, `placement_of(scene, terrain)` the plants, from an inventory
 or by rules; both are cut into square tiles, and the plants of a tile come most important first
-(docs/placement.md). What plants look like is no business of this room.
+(docs/placement.md). `species_of` finds what they look like, `pyramid_of` puts squares over the
+tiles, and `write_tiles` writes them (docs/commands/tiles.md).
 """

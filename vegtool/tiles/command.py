@@ -59,7 +59,7 @@ def run_tiles(
     size = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
     facts = {
         "tileset": str(folder / TILESET),
-        "plants": int(pyramid.placement.tiles.count.sum()),
+        "plants": rows[-1]["plants"],
         "bytes": size,
         "seconds": round(seconds, 2),
         "tiles": rows,

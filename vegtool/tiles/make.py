@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from vegtool.arrays import FloatArray
 from vegtool.formats.gltf import level_glb
 from vegtool.formats.gltf_tile import Instances, instanced_glb, merged_glb
 from vegtool.plant import Plant
@@ -28,7 +29,8 @@ SEEN_FROM = 0.25
 class Tile:
     """data: of its .glb file. plants: on the square. triangles, draws: what a client draws. kind:
     how it was made. error_m: how far from its place anything is drawn, for 95 % of it; None where
-    that was not measured."""
+    that was not measured. bounds: (2, 3) metres in the scene's frame, where what is drawn may reach
+    beyond the plants."""
 
     node: Node
     data: bytes
@@ -37,36 +39,42 @@ class Tile:
     triangles: int
     draws: int
     error_m: float | None = None
+    bounds: FloatArray | None = None
     seconds: dict[str, float] = field(default_factory=dict)
 
 
 def make_tile(
-    pyramid: Pyramid, node: Node, shared: Shared, quarter: Callable[[Node], Plant]
-) -> Tile:
-    """Make a tile. quarter: the plant that a tile that was made before is, as a client loads it."""
+    pyramid: Pyramid, node: Node, shared: Shared, quarter: Callable[[Node], Plant | None]
+) -> Tile | None:
+    """Make a tile; None where no plants turn out to stand on it. quarter: the plant that a tile
+    made before is, as a client loads it."""
     height = pyramid.tree.height(node.level)
     if pyramid.instanced(height):
         return _instanced(pyramid, node, shared)
+    sheet = shared.sheets[height]
     seconds: dict[str, float] = {}
     with timed(seconds, "placement"):
         stand = pyramid.stand(node)
+        if not len(stand):
+            return None
         level, times = fitting(
-            stand, pyramid.switch_m, pyramid.of_level, pyramid.made_for_m(height),
+            stand, pyramid.switch_m, sheet.triangles, pyramid.made_for_m(height),
             pyramid.options.triangles, FINEST,
         )  # fmt: skip
     if times > COARSEST and not pyramid.instanced(height - 1):
         return _reclustered(pyramid, node, len(stand), quarter)
-    sheet = shared.sheets[height]
     with timed(seconds, "merging"):
         part = sheet.part[stand.species, level]
         group = merged(stand, part, sheet.sheet.parts, pyramid.origin(node))
     with timed(seconds, "writing"):
         data = merged_glb(group, sheet.files, str(node), pyramid.options.plain)
-    return Tile(node, data, "merged", len(stand), len(group.indices) // 3, 1, None, seconds)
+    return Tile(node, data, "merged", len(stand), len(group.indices) // 3, 1, seconds=seconds)
 
 
-def _instanced(pyramid: Pyramid, node: Node, shared: Shared) -> Tile:
+def _instanced(pyramid: Pyramid, node: Node, shared: Shared) -> Tile | None:
     stand = pyramid.stand(node)
+    if not len(stand):
+        return None
     height = pyramid.tree.height(node.level)
     level = level_at(stand, pyramid.switch_m, pyramid.made_for_m(height), FINEST)
     pair, which = np.unique(np.stack([stand.species, level], axis=1), axis=0, return_inverse=True)
@@ -91,21 +99,23 @@ def _instanced(pyramid: Pyramid, node: Node, shared: Shared) -> Tile:
 
 
 def _reclustered(
-    pyramid: Pyramid, node: Node, plants: int, quarter: Callable[[Node], Plant]
+    pyramid: Pyramid, node: Node, plants: int, quarter: Callable[[Node], Plant | None]
 ) -> Tile:
+    from vegtool.measure.pictures import client_plant
     from vegtool.tiles.recluster import group_of, reclustered
 
     tree, options = pyramid.tree, pyramid.options
-    quarters = tree.below[node]
     origin = pyramid.origin(node)
     seconds: dict[str, float] = {}
     with timed(seconds, "quarters"):
-        places = [pyramid.origin(one) - origin for one in quarters]
-        group = group_of([quarter(one) for one in quarters], places, str(node))
+        read = {one: quarter(one) for one in tree.below[node]}
+        there = {one: plant for one, plant in read.items() if plant is not None}
+        places = [pyramid.origin(one) - origin for one in there]
+        group = group_of(list(there.values()), places, str(node))
     away = pyramid.from_m(tree.height(node.level)) + SEEN_FROM * tree.side(node.level)
     level = reclustered(group, options.triangles, away, pyramid.display, options.max_texture)
     error = None if level.geometric_error_m is None else level.geometric_error_m[1]
     return Tile(
         node, level_glb(level, str(node)), "reclustered", plants, level.triangles, 1, error,
-        {**seconds, **level.seconds},
+        client_plant(level).bounds + origin, {**seconds, **level.seconds},
     )  # fmt: skip

@@ -24,8 +24,11 @@ def merged(
     """All plants as triangles in metres from `origin`, (3,).
 
     part: (n,) which of the parts each plant is drawn as. Plants of one part follow each other, in
-    the stand's order. Colours are the parts' own times the plants' tints over BRIGHTEST.
+    the stand's order. Colours are the parts' own times the plants' tints over BRIGHTEST. Raises
+    ValueError for a part that is none, and where there are no plants.
     """
+    if not len(part) or part.min() < 0 or part.max() >= len(parts):
+        raise ValueError("merged: expected plants, and a part for each")
     drawn = [
         _repeated(stand, np.flatnonzero(part == index), parts[index], origin)
         for index in np.unique(part)

@@ -98,7 +98,9 @@ class Pyramid:
         """(s,) scale that no plant of each species is above."""
         own = np.array([one.height for one in self.species])
         tallest = self.placement.tallest(len(own))
-        return np.where(np.isfinite(tallest), tallest / own, 1.0)
+        return np.asarray(
+            np.fmax(1.0, tallest / own)
+        )  # plants without a height are as tall as their model
 
     @cached_property
     def _around(self) -> FloatArray:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from vegtool.arrays import IntArray
+from vegtool.arrays import FloatArray, IntArray
 from vegtool.formats import png
 from vegtool.formats.gltf_tile import SheetFiles
-from vegtool.formats.shared_model import SharedModel, shared_model
+from vegtool.formats.shared_model import SharedModel, plain_name, shared_model
 from vegtool.tiles.pyramid import Pyramid, used_levels
 from vegtool.tiles.sheet import Sheet, sheet_of
 
@@ -27,6 +28,15 @@ class Shared:
     files: dict[str, bytes] = field(default_factory=dict)
 
 
+def file_names(names: Sequence[str]) -> list[str]:
+    """Names that no two have, whatever the file system thinks of capitals."""
+    plain = [plain_name(name).lower() for name in names]
+    return [
+        name if plain.count(own) == 1 else f"{name}_{index}"
+        for index, (name, own) in enumerate(zip(names, plain, strict=True))
+    ]
+
+
 @dataclass(frozen=True, eq=False)
 class MergedSheet:
     """A sheet, where its textures are, and (s, l) int32 the parts that levels are; -1 for none."""
@@ -35,13 +45,20 @@ class MergedSheet:
     files: SheetFiles
     part: IntArray
 
+    @property
+    def triangles(self) -> FloatArray:
+        """(s, l) of each level as the sheet has it; 0 where it has none."""
+        count = np.array([len(part.indices) // 3 for part in self.sheet.parts], np.float64)
+        return np.where(self.part >= 0, count[self.part], 0.0)
+
 
 def shared_of(pyramid: Pyramid, heights: range, folder: str = f"{FOLDER}/") -> Shared:
     """All that squares of these heights draw with; folder: where it is, as seen from a tile."""
     near = [height for height in heights if pyramid.instanced(height)]
+    names = file_names([one.name for one in pyramid.species])
     models = {
         (kind, level): shared_model(
-            pyramid.species[kind].levels[level], f"{pyramid.species[kind].name}_LOD{level}", folder
+            pyramid.species[kind].levels[level], f"{names[kind]}_LOD{level}", folder
         )
         for kind, level in used_levels(pyramid, near)
     }
@@ -63,6 +80,6 @@ def shared_of(pyramid: Pyramid, heights: range, folder: str = f"{FOLDER}/") -> S
         if sheet.normal is not None:
             normal = f"{folder}{name}_normal.png"
             files[f"{name}_normal.png"] = png.encode(sheet.normal[..., :3])
-        found = SheetFiles(f"{folder}{name}_color.png", normal, sheet.double_sided)
+        found = SheetFiles(f"{folder}{name}_color.png", normal, sheet.double_sided, sheet.unlit)
         sheets[height] = MergedSheet(sheet, found, part)
     return Shared(models, sheets, files)

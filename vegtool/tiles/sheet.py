@@ -7,7 +7,7 @@ then stands there twice, as in the pairs of quads of a level with different side
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,6 +33,9 @@ OUTSIDE = 1e-3
 """Of a picture's side, how far beyond it texture coordinates may lie, by rounding."""
 
 
+Key = tuple[int, int, bytes, bool, float]
+
+
 @dataclass(frozen=True, eq=False)
 class Sheet:
     """What a merged group is drawn with. Its colours, of pictures and of parts, are BRIGHTEST times
@@ -40,13 +43,14 @@ class Sheet:
 
     color: (h, w, 4) uint8, sRGB, straight alpha, cut off at one half. normal: (h, w, 4) uint8
     tangent space, or None where no level has one. parts: each level as triangles whose texture
-    coordinates are the sheet's. double_sided: of the one material.
+    coordinates are the sheet's. double_sided, unlit: of the one material.
     """
 
     color: ByteArray
     normal: ByteArray | None
     parts: tuple[Triangles, ...]
     double_sided: bool
+    unlit: bool = False
 
     def material(self, name: str) -> Material:
         """Of everything that is drawn with the sheet."""
@@ -57,6 +61,7 @@ class Sheet:
             normal_texture=normal,
             alpha_mode="mask",
             double_sided=self.double_sided,
+            unlit=self.unlit,
             role="leaf",
         )
 
@@ -64,10 +69,19 @@ class Sheet:
 def sheet_of(levels: Sequence[Plant], max_side: int) -> Sheet:
     """One sheet for these levels, in their order.
 
-    Raises UsageError where the pictures do not fit into a square of `max_side` texels.
+    Raises UsageError where the pictures do not fit into a square of `max_side` texels, and where
+    light is in the colours of some levels and not of others.
     """
-    textures = list({id(t): t for plant in levels for t in _colors(plant)}.values())
-    sizes = [texture.pixels.shape[1::-1] for texture in textures]
+    unlit = {material.unlit for plant in levels for material in _used(plant)}
+    if len(unlit) > 1:
+        names = sorted({p.source or p.name for p in levels if any(m.unlit for m in _used(p))})
+        raise UsageError(
+            f"{', '.join(names)}: light is in the colours, and not in those of other species, with "
+            "which they are to be merged; convert all with --prelit, or none"
+        )
+    pictured = {_key(m): m for plant in levels for m in _used(plant) if m.color_texture is not None}
+    pictures = [_picture(material) for material in pictured.values()]
+    sizes = [picture.shape[1::-1] for picture in pictures]
     packing = pack(np.array([*sizes, (WHITE, WHITE)], np.int32), GUTTER, max_side)
     if max(packing.width, packing.height) > max_side:
         raise UsageError(
@@ -77,36 +91,50 @@ def sheet_of(levels: Sequence[Plant], max_side: int) -> Sheet:
     color = np.zeros((packing.height, packing.width, 4), np.uint8)
     normals = any(m.normal_texture for plant in levels for m in _used(plant))
     normal = np.full_like(color, FLAT) if normals else None
-    for rect, texture in zip(packing.rect, textures, strict=False):
-        _paste(color, rect, _brighter(texture.pixels))
+    for rect, picture in zip(packing.rect, pictures, strict=False):
+        _paste(color, rect, picture)
     _paste(color, packing.rect[-1], np.full((WHITE, WHITE, 4), 255, np.uint8))
-    place = {id(texture): rect for texture, rect in zip(textures, packing.rect, strict=False)}
-    for plant in levels:
-        for material in _used(plant):
-            of, bumps = material.color_texture, material.normal_texture
-            if normal is not None and of is not None and bumps is not None:
-                _paste(normal, place[id(of)], _resized(bumps.pixels, of.pixels.shape))
+    place = dict(zip(pictured, packing.rect, strict=False))
+    for key, material in pictured.items():
+        if normal is not None and material.normal_texture is not None:
+            _, _, width, height = place[key]
+            _paste(normal, place[key], _resized(material.normal_texture.pixels, (height, width)))
     double_sided = all(m.double_sided for plant in levels for m in _used(plant))
     size = np.array([packing.width, packing.height], np.float64)
     parts = tuple(
         _part(plant, place, packing.rect[-1], size, double_sided, normals) for plant in levels
     )
-    return Sheet(color, normal, parts, double_sided)
+    return Sheet(color, normal, parts, double_sided, unlit == {True})
 
 
 def _used(plant: Plant) -> list[Material]:
     return [plant.materials[index] for index in np.unique(plant.face_material)]
 
 
-def _colors(plant: Plant) -> Iterable[Texture]:
-    return (m.color_texture for m in _used(plant) if m.color_texture is not None)
+def _key(material: Material) -> Key:
+    """What the picture of a material is made of."""
+    masked = material.alpha_mode == "mask"
+    return (
+        id(material.color_texture), id(material.normal_texture), material.base_color.tobytes(),
+        masked, material.alpha_cutoff if masked else 0.0,
+    )  # fmt: skip
 
 
-def _brighter(pixels: ByteArray) -> ByteArray:
-    """A picture times BRIGHTEST, in linear light."""
-    light = np.minimum(BRIGHTEST * linear_from_srgb(np.arange(256) / 255), 1.0)
-    table = np.rint(255 * srgb_from_linear(light)).astype(np.uint8)
-    return np.concatenate([table[pixels[..., :3]], pixels[..., 3:]], axis=2)
+def _picture(material: Material) -> ByteArray:
+    """What a material shows, as a sheet has it: BRIGHTEST times as bright, cut off at one half."""
+    assert material.color_texture is not None
+    pixels, factor = material.color_texture.pixels, material.base_color
+    result = np.empty_like(pixels)
+    for channel in range(3):
+        light = linear_from_srgb(np.arange(256) / 255) * factor[channel] * BRIGHTEST
+        table = np.rint(255 * srgb_from_linear(np.minimum(light, 1.0))).astype(np.uint8)
+        result[..., channel] = table[pixels[..., channel]]
+    result[..., 3] = 255
+    if material.alpha_mode == "mask":
+        # what passes at the material's cutoff passes at one half, and mips keep in between
+        shown = pixels[..., 3] * factor[3] / max(material.alpha_cutoff, 1 / 255) / 2
+        result[..., 3] = np.clip(np.rint(shown), 0, 255)
+    return result
 
 
 def _paste(into: ByteArray, rect: IntArray, pixels: ByteArray) -> None:
@@ -130,7 +158,7 @@ def _resized(pixels: ByteArray, shape: tuple[int, ...]) -> ByteArray:
 
 def _part(
     plant: Plant,
-    place: dict[int, IntArray],
+    place: dict[Key, IntArray],
     white: IntArray,
     size: FloatArray,
     double_sided: bool,
@@ -144,12 +172,10 @@ def _part(
         of_material = plant.faces[plant.face_material == index]
         vertices, corners = np.unique(of_material, return_inverse=True)
         corners = corners.reshape(-1, 3)
-        color = np.broadcast_to(material.base_color, (len(vertices), 4)).copy()
-        if plant.colors is not None:
-            color *= plant.colors[vertices]
+        color = np.ones((len(vertices), 4)) if plant.colors is None else plant.colors[vertices]
         if material.color_texture is None:
             uv = np.tile((white[:2] + white[2:] / 2) / size, (len(vertices), 1))
-            color = np.minimum(color * BRIGHTEST, 1.0)
+            color = np.minimum(color * material.base_color * BRIGHTEST, 1.0)
             color[:, 3] = 1.0
         else:
             own = plant.uvs[vertices]
@@ -158,7 +184,7 @@ def _part(
                     f"{plant.source or plant.name}: repeats its textures, which cannot be merged; "
                     "convert it (vegtool convert), and its levels can"
                 )
-            rect = place[id(material.color_texture)]
+            rect = place[_key(material)]
             uv = (rect[:2] + np.clip(own, 0, 1) * rect[2:]) / size
         sides = [(plant.normals[vertices], corners)]
         if material.double_sided and not double_sided:
