@@ -142,12 +142,6 @@ def test_squares_are_named_and_sorted_by_level() -> None:
     ]  # fmt: skip
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="quadtree.py:92 takes a tile's square from the middle of its bounds; those of a "
-    "procedural tile reach out of its square, and are cut off at the border of the ground, so that "
-    "of a strip the middle lies on the neighbour's square",
-)
 def test_every_tile_of_a_placement_has_a_square_of_its_own(tmp_path: Path) -> None:
     """The ground goes on for 1 cm beyond the last whole tile."""
     head = TWO_SPECIES + "[placement]\nspacing_m = 3\n[terrain]\n"

@@ -83,12 +83,15 @@ class Tiles:
     """Squares of ground with plants on them.
 
     low, high: (t, 3) float64 metres, bounds of the feet of the plants of each tile (crowns not
-    included). count: (t,) int64, how many plants, an upper bound where they are procedural.
+    included). count: (t,) int64, how many plants, an upper bound where they are procedural. cell:
+    (t, 2) int64, column along x and row along z of each square; None where feet stay on theirs, so
+    that the middle of the bounds tells.
     """
 
     low: FloatArray
     high: FloatArray
     count: LongArray
+    cell: LongArray | None = None
 
     def __post_init__(self) -> None:
         low = checked("Tiles.low", self.low, (None, 3), np.float64)
@@ -100,6 +103,9 @@ class Tiles:
             raise ValueError("Tiles.count: a tile without plants is none")
         for name, value in (("low", low), ("high", high), ("count", count)):
             object.__setattr__(self, name, value)
+        if self.cell is not None:
+            cell = checked("Tiles.cell", self.cell, (len(low), 2), np.int64)
+            object.__setattr__(self, "cell", cell)
 
     def __len__(self) -> int:
         return len(self.count)

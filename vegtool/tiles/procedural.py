@@ -145,7 +145,7 @@ def place(scene: Scene, terrain: Terrain, tile_m: float, progress: Progress) -> 
         period,
         scale,
         np.zeros(3) if terrain.origin is None else terrain.origin,
-        Tiles(low[there], high[there], counts[there]),
+        Tiles(low[there], high[there], counts[there], np.stack([column, row], axis=1)[there]),
         column[there],
         row[there],
         scene.placement.seed or 0,

@@ -89,8 +89,10 @@ class Quadtree:
 
 def quadtree_of(tiles: Tiles, side_m: float) -> Quadtree:
     """The least pyramid over tiles of that side, of which there is one at least."""
-    middle = (tiles.low + tiles.high)[:, [0, 2]] / 2
-    cell = np.floor(middle / side_m).astype(np.int64)
+    cell = tiles.cell
+    if cell is None:
+        middle = (tiles.low + tiles.high)[:, [0, 2]] / 2
+        cell = np.floor(middle / side_m).astype(np.int64)
     first = cell.min(axis=0)
     size = int((cell.max(axis=0) - first).max()) + 1
     return Quadtree(side_m, max(size - 1, 0).bit_length(), first, cell - first)
