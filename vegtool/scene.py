@@ -47,7 +47,7 @@ SCHEMA: dict[str, dict[str, Key]] = {
     "camera": {
         "path": Key("text", "file with the path that the viewer takes"),
         "polygon": Key("points", "corners of the area that the viewer stays in, metres"),
-        "height_m": Key("range", "lowest and highest eye above the ground"),
+        "height_m": Key("range", "lowest and highest eye above the ground", least=0),
         "fov_y_deg": _like("fov", "number", "vertical field of view, as --fov"),
         "image_height_px": _like("image_height", "integer", "image height, as --image-height"),
         "above": Key("boolean", "whether plants may be seen from above"),

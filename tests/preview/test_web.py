@@ -209,7 +209,7 @@ def test_a_file_that_is_no_glb_is_not_handed_on(folder: Path) -> None:
 
 def test_numbers_that_are_none_are_refused(folder: Path) -> None:
     edit(folder, lambda values: values.update(extent_m=float("nan")))
-    with pytest.raises(InputError, match=r"oak\.lod\.json: expected finite numbers"):
+    with pytest.raises(InputError, match=r"oak\.lod\.json: expected a manifest, found no JSON"):
         web_page(folder)
 
 

@@ -48,6 +48,10 @@ class LevelFile:
     leaf: str | None = None
 
 
+MOST_PIXELS = 10**6
+"""Of a picture's height."""
+
+
 def manifest(
     chain: LodChain, files: Sequence[LevelFile], shadow: LevelFile | None = None
 ) -> dict[str, Any]:
@@ -167,7 +171,7 @@ def read_manifest(path: Path) -> dict[str, Any]:
     vegtool reads, or lacks a key that it needs.
     """
     try:
-        values = json.loads(path.read_bytes())
+        values = json.loads(path.read_bytes(), parse_constant=_no_number)
     except OSError as error:
         raise InputError(
             f"{path}: cannot be read ({error.strerror}); expected a manifest, NAME.lod.json, as "
@@ -183,11 +187,15 @@ def read_manifest(path: Path) -> dict[str, Any]:
         raise InputError(
             f"{path}: expected a manifest of version {VERSION}, found {found}. {_AGAIN}"
         )
-    fault = _fault(values, schema(), "")
+    fault = _fault(values, schema(), "") or _display_fault(values)
     if fault:
         raise InputError(f"{path}: {fault}. {_AGAIN}")
     result: dict[str, Any] = values
     return result
+
+
+def _no_number(word: str) -> None:
+    raise ValueError(f"{word} is none of JSON's numbers")
 
 
 def _fault(value: Any, rule: dict[str, Any], where: str) -> str:
@@ -213,6 +221,16 @@ def _fault(value: Any, rule: dict[str, Any], where: str) -> str:
         return ""
     faults = (_fault(part, r, f"{where}.{key}".lstrip(".")) for key, part, r in parts)
     return next(filter(None, faults), "")
+
+
+def _display_fault(values: dict[str, Any]) -> str:
+    """What is wrong with the picture that distances are stated for."""
+    fov, height = values["fov_y_deg"], values["image_height_px"]
+    if not 0 < fov < 180:
+        return f"fov_y_deg: expected more than 0 and less than 180, found {fov!r}"
+    if not 1 <= height <= MOST_PIXELS:
+        return f"image_height_px: expected 1 to {MOST_PIXELS:,}, found {height!r}"
+    return ""
 
 
 def _is(value: Any, name: str) -> bool:

@@ -355,7 +355,9 @@ def frame(found: Seen, what: Chosen, paint: np.ndarray | None = None) -> Frame:
     rows["tint"] = stock["tint"] if paint is None else paint
     steps = np.floor(-np.log(np.clip(what.kept, 1e-6, 1)) / np.log(SHARES)).astype(np.int64)
     key = (what.model * 64 + steps) * 2 + what.fading
-    order = np.argsort(key.astype(np.uint16), kind="stable")  # 16 bits: a radix sort
+    if not len(key) or key.max() < 2**16:  # 16 bits: a radix sort
+        key = key.astype(np.uint16)
+    order = np.argsort(key, kind="stable")
     key, rows = key[order], rows[order]
     if not len(rows):
         return Frame(rows, ())

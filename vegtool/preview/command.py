@@ -13,6 +13,7 @@ from vegtool.errors import OutputError, UsageError
 from vegtool.formats import ReadOptions
 from vegtool.formats.atomic import FileSet, check_free
 from vegtool.preview.options import PreviewOptions
+from vegtool.preview.tileset import tileset_at
 from vegtool.progress import Progress
 
 if TYPE_CHECKING:
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from vegtool.preview.scenery import Place
     from vegtool.scene import Scene
 
+SEVERAL_FILES = (".gltf", ".obj")
+"""Extensions of models whose pictures are files of their own."""
 READING = 0.2
 """Of the progress of what is written: reading files."""
 
@@ -75,7 +78,6 @@ def run_preview(
         with bar("preview"):
             return _write_page(wanted)
     from vegtool.preview.tile_world import read_tile_world
-    from vegtool.preview.tileset import tileset_at
     from vegtool.preview.world import parts_of, read_world, way_of
 
     tiles = tileset_at(wanted.path)
@@ -94,7 +96,7 @@ def run_preview(
 
         path = read_path(way)
     _check_written(wanted, path, _inputs(wanted, scene, way))
-    if wanted.window:
+    if wanted.window and wanted.path.exists():  # what is not there is told first
         from vegtool.gl.window import check_display
 
         check_display()
@@ -131,6 +133,11 @@ def _check(wanted: Wanted, options: PreviewOptions, read: ReadOptions) -> None:
         raise UsageError("--stats: writes what frames took; add how many, --frames N")
     others = (wanted.scene, wanted.camera, wanted.out, wanted.screenshot, wanted.frames)
     plain = options == PreviewOptions() and read == ReadOptions()
+    if wanted.html is not None and tileset_at(wanted.path) is not None:
+        raise UsageError(
+            "--html: writes a page of converted plants; a tileset is for viewers of 3D Tiles, and "
+            "has none. Leave out --html, or name the folder of the plants"
+        )
     if wanted.html is not None and not (plain and all(other is None for other in others)):
         raise UsageError(
             "--html: writes a page that shows converted plants by themselves; leave out all else "
@@ -165,7 +172,11 @@ def _check_written(wanted: Wanted, path: CameraPath | None, inputs: list[Path]) 
 
         check_output(wanted.out, path.fps, wanted.force)
     for file in (wanted.screenshot, wanted.stats):
-        if file is not None and file.exists() and any(_same(file, one) for one in inputs):
+        if (
+            file is not None
+            and file.exists()
+            and (any(_same(file, one) for one in inputs) or _beside(file, wanted.path))
+        ):
             raise OutputError(
                 f"{file}: is read by this command, and never overwritten. Name another file."
             )
@@ -181,6 +192,15 @@ def _inputs(wanted: Wanted, scene: Scene | None, way: Path | None) -> list[Path]
     if wanted.path.is_dir():
         named += wanted.path.glob("*.lod.json")
     return [file for file in named if file is not None and file.is_file()]
+
+
+def _beside(file: Path, read: Path) -> bool:
+    """Whether a file may belong to what is read: a picture of a model that is no single file, or
+    anything among tiles."""
+    tiles = tileset_at(read)
+    if tiles is not None:
+        return file.resolve().is_relative_to(tiles.parent.resolve())
+    return read.suffix.lower() in SEVERAL_FILES and _same(file.parent, read.parent)
 
 
 def _same(file: Path, other: Path) -> bool:

@@ -80,7 +80,7 @@ class Show:
             framebuffer.clear(*_behind(look), 1.0)
             self.stats = self.forest.draw(state.eye, size, look)
         if self.stats is not None:
-            took = sum(self.stats.seconds.values())
+            took = sum(s for part, s in self.stats.seconds.items() if part != "load")
             self._times = [*self._times[1 - FRAMES_TOLD :], took]
             if state.governor is not None:
                 governor = step(state.governor, 1e3 * took, seconds or None)

@@ -16,7 +16,6 @@ import numpy as np
 
 from vegtool.arrays import Picture
 from vegtool.elements import unordered
-from vegtool.formats import read_plant
 from vegtool.gl.context import OnGpu
 from vegtool.gl.draw import MSAA
 from vegtool.gl.instances import INSTANCE, WHOLE
@@ -28,7 +27,7 @@ from vegtool.preview.eye import Eye
 from vegtool.preview.palette import PALETTE
 from vegtool.preview.reveal import noise
 from vegtool.preview.scenery import AS_IT_IS, VIEWS, FrameStats, Look
-from vegtool.preview.tileset import Copies, Tileset, read_tile
+from vegtool.preview.tileset import Copies, Tileset, read_model, read_tile
 
 CLIENT_PX = 16.0
 """Pixels that a tile's error may be seen as at detail 1, as clients have it."""
@@ -40,10 +39,12 @@ ALL_TEXELS = (2.0, 1.0, 1.0)
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """A tile on the GPU: rows of INSTANCE, places relative to the tile's origin, of each model."""
+    """A tile on the GPU: rows of INSTANCE, places relative to the tile's origin, of each model.
+    kinds: numbers of their species; 0 where several are merged."""
 
     rows: tuple[np.ndarray, ...]
     models: tuple[int, ...]
+    kinds: tuple[int, ...]
 
 
 class TileForest(OnGpu):
@@ -71,8 +72,8 @@ class TileForest(OnGpu):
             self._landscape = None
         for texture in self._textures.values():
             texture.release()
-        self._textures.clear()
-        self._held.clear()
+        for kept in (self._textures, self._held, self._models, self._plants, self._images):
+            kept.clear()
 
     @property
     def texture_bytes(self) -> int:
@@ -149,12 +150,12 @@ class TileForest(OnGpu):
         for tile in tiles:
             held = self._on_gpu(tile)
             away = (self.tileset.origin[tile] - eye.position).astype(np.float32)
-            for rows, model in zip(held.rows, held.models, strict=True):
+            for rows, model, kind in zip(held.rows, held.models, held.kinds, strict=True):
                 moved = rows.copy()
                 moved["place"][:, :3] += away
                 if look.color not in VIEWS:
-                    which = self.tileset.depth[tile] if look.color == "by level" else model
-                    moved["tint"] = PALETTE[int(which) % len(PALETTE)]
+                    which = self._level(tile) if look.color == "by level" else kind
+                    moved["tint"] = PALETTE[which % len(PALETTE)]
                 parts.append(moved)
                 batches.append(Batch(model, first, len(rows), WHOLE))
                 first += len(rows)
@@ -165,13 +166,18 @@ class TileForest(OnGpu):
             copies = read_tile(self.tileset.file[tile], self._model)
             rows = tuple(_rows(one) for one in copies)
             models = tuple(self._uploaded(one) for one in copies)
-            self._held[tile] = Held(rows, models)
+            kinds = tuple(_kind(one.file) for one in copies)
+            self._held[tile] = Held(rows, models, kinds)
         return self._held[tile]
+
+    def _level(self, tile: int) -> int:
+        """0 for the finest tiles."""
+        return int(self.tileset.depth.max() - self.tileset.depth[tile])
 
     def _model(self, path: Path) -> Plant:
         """A model that tiles share, read once."""
         if path not in self._plants:
-            self._plants[path] = read_plant(path)
+            self._plants[path] = read_model(path)
         return self._plants[path]
 
     def _uploaded(self, copies: Copies) -> int:
@@ -190,7 +196,8 @@ class TileForest(OnGpu):
             if image is None:
                 return None
             key = (zlib.crc32(image.pixels.tobytes()), *image.pixels.shape)
-            return self._images.setdefault(key, image)
+            known = self._images.setdefault(key, image)
+            return known if np.array_equal(known.pixels, image.pixels) else image
 
         materials = tuple(
             replace(
@@ -202,6 +209,12 @@ class TileForest(OnGpu):
             for material in plant.materials
         )
         return replace(plant, materials=materials)
+
+
+def _kind(file: Path) -> int:
+    """A number of the species, whichever level of it a shared model is: NAME_LOD1.gltf."""
+    name, level, _ = file.stem.rpartition("_LOD")
+    return 1 + zlib.crc32(name.encode()) % (len(PALETTE) - 1) if level else 0
 
 
 def _rows(copies: Copies) -> np.ndarray:

@@ -47,12 +47,13 @@ class TileWorld:
         return TileForest(self.tileset, self.ground)
 
     def details(self, focal_px: float) -> list[str]:
-        """From where tiles of each level are drawn."""
+        """From where tiles of each level are drawn, 0 being the finest."""
         found, tiles = [], self.tileset
         for depth in range(int(tiles.depth.max()) + 1):
             here = tiles.depth == depth
             away = tiles.error_m[here].max() * focal_px / CLIENT_PX
-            found.append(f"level {depth}: {int(here.sum()):,} tiles, drawn from {away:,.3g} m")
+            level = int(tiles.depth.max()) - depth
+            found.append(f"level {level}: {int(here.sum()):,} tiles, drawn from {away:,.3g} m")
         return found
 
 

@@ -190,6 +190,10 @@ def _glb(path: Path, manifest: Path) -> bytes:
             f"{manifest}: names {path.name} as a level, which cannot be read ({error.strerror}); "
             "put it there, or convert the plant again"
         ) from error
+    if int.from_bytes(data[8:12], "little") > len(data):
+        raise InputError(
+            f"{manifest}: names {path.name} as a level, which is cut short; convert the plant again"
+        )
     if not data.startswith(GLB_MAGIC):
         raise InputError(
             f"{manifest}: names {path.name} as a level, which was expected to be a GLB and is "
