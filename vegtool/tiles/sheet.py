@@ -19,6 +19,7 @@ from vegtool.lod import Triangles
 from vegtool.plant import Material, Plant, Texture
 from vegtool.srgb import linear_from_srgb, srgb_from_linear
 from vegtool.tangents import tangents
+from vegtool.tiles.variation import BRIGHTNESS, WARMTH
 
 GUTTER = 4
 """Texels between pictures, which go on in it: a client's second mip still keeps them apart."""
@@ -26,9 +27,10 @@ WHITE = 8
 """Texels: side of the block that has no picture."""
 FLAT = (128, 128, 255, 255)
 """A normal that points straight out."""
-BRIGHTEST = 1.25
-"""A linear factor that no plant's tint is above (variation.py). Vertex colours are 1 at most, so
-those of merged groups are divided by it, and what a sheet shows is so much brighter."""
+BRIGHTEST = (1 + BRIGHTNESS) * (1 + WARMTH)
+"""A linear factor that no plant's tint is above. Vertex colours are 1 at most, so those of merged
+groups are divided by it, and what a sheet shows is so much brighter; white, which cannot be, is
+drawn at 87 %."""
 OUTSIDE = 1e-3
 """Of a picture's side, how far beyond it texture coordinates may lie, by rounding."""
 
