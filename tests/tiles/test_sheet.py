@@ -286,7 +286,7 @@ def test_a_tint_of_1_shows_the_models_color(light: float) -> None:
 
 @pytest.mark.parametrize("pictured", [True, False])
 def test_white_loses_what_tints_need(pictured: bool) -> None:
-    """A plant of tint 1 is drawn at 1 / BRIGHTEST of what its sheet shows, which is white at most."""
+    """A plant of tint 1 is drawn at 1 / BRIGHTEST of its sheet, where white is white."""
     white = leaf(texture(np.full((4, 4, 4), 255))) if pictured else painted([1.0, 1, 1, 1])
     np.testing.assert_allclose(shown(cards([0, 1, 0], 0.5, white)), 1 / BRIGHTEST, rtol=0.02)
 
