@@ -86,7 +86,7 @@ def main() -> int:
     parser.add_argument("--views", type=int, default=VIEWS, help="frames of a walk")
     parser.add_argument("--stations", type=int, default=STATIONS, help="compared with the truth")
     parser.add_argument("--pairs", type=int, default=PAIRS, help="of frames at each transition")
-    parser.add_argument("--figures", type=Path, help="folder for preview_*.png")
+    parser.add_argument("--figures", type=Path, help="folder for preview_*.png and .jpg")
     parser.add_argument("--record", action="store_true", help="append to results/preview_*.csv")
     parser.add_argument("--markdown", action="store_true", help="rewrite the tables of the page")
     known = parser.parse_args()
@@ -138,7 +138,10 @@ def main() -> int:
     if known.figures is not None:
         known.figures.mkdir(parents=True, exist_ok=True)
         (known.figures / "preview_tradeoff.png").write_bytes(tradeoff.plot(bought))
-        sheet.sheet(strips).save(known.figures / "preview_sheet.png", optimize=True)
+        few_strips = strips[1 :: tradeoff.STATIONS][:2]
+        for name, shown_strips in (("sheet", strips), ("walk", few_strips)):
+            picture = sheet.sheet(shown_strips)
+            picture.save(known.figures / f"preview_{name}.jpg", quality=75, optimize=True)
     if known.record:
         about = {"version": __version__, "renderer": describe().renderer, "cores": os.cpu_count()}
         for part, rows in told.items():
