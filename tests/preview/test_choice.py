@@ -53,6 +53,7 @@ from vegtool.preview.choice import (
     seen,
     switches,
 )
+from vegtool.preview.correction import NONE, SIDES, Correction
 from vegtool.preview.eye import Eye
 from vegtool.preview.options import FadeMode
 from vegtool.preview.reveal import noise, threshold_of
@@ -433,11 +434,12 @@ def test_stages_at_the_ends_of_fades_do_not_depend_on_detail(detail: float) -> N
 
 
 def test_lengths_are_corrected_along_stages() -> None:
-    """By what lies between the two nearest stages; a level that is held is not."""
+    """By what lies between the two nearest stages and sides; a level that is held is not."""
     species, made = garden(), kinds(garden())
     stages, factors = np.array([0.5, 1.0, 1.5, 2.5]), np.array([1.1, 1.2, 1.4, 0.9])
-    nothing = np.zeros(1), np.ones(1)
-    corrected = replace(made, corrections=(nothing, (stages, factors), nothing))
+    sides = 1 + 0.1 * np.cos(2 * np.pi * np.arange(SIDES) / SIDES)
+    correction = Correction(stages, factors[:, None] * sides)
+    corrected = replace(made, corrections=(NONE, correction, NONE))
     away, kind = distances(7)
     found = found_at(species, away, kind)
     plain, what = (
@@ -450,6 +452,10 @@ def test_lengths_are_corrected_along_stages() -> None:
         if kind[of] == 1:
             stage = float(at.stage(kind[[of]], away[[of]].astype(np.float32))[0])
             factor = float(np.interp(stage, stages, factors))
+            x, _, z = found.place[of].astype(float)
+            cos, sin = found.rows["turn"][of].astype(float)
+            turned = (np.arctan2(sin, cos) + np.pi - np.arctan2(x, z)) / (2 * np.pi) * SIDES
+            factor *= float(np.interp(turned % SIDES, np.arange(SIDES + 1), [*sides, sides[0]]))
         assert what.length[row] == pytest.approx(plain.length[row] * factor, rel=1e-4)
     held = chosen(found, corrected, 1.0, "alpha-test", 0)
     np.testing.assert_array_equal(held.length, chosen(found, made, 1.0, "alpha-test", 0).length)

@@ -3,7 +3,9 @@
 What is left out, what fades, and an alpha test of mip-mapped texels all change how much of the
 picture a plant covers, each by some per cent. What is drawn is compared with the plant itself,
 supersampled, at distances that span each kind's range, and enlarged about the middles of its
-elements by the square root of the ratio: quadrilaterals and triangles grow by some per cent.
+elements by the square root of the ratio: quadrilaterals and triangles grow by some per cent. A
+plant of few triangles is too wide from one side and too narrow from another: where it is small, it
+is compared from each side by itself.
 """
 
 from __future__ import annotations
@@ -22,7 +24,6 @@ from vegtool.gl.landscape import Batch, Frame, Landscape, picture
 from vegtool.lighting.light import Light
 from vegtool.preview.choice import (
     BEYOND,
-    Correction,
     Kinds,
     Seen,
     Switches,
@@ -30,13 +31,16 @@ from vegtool.preview.choice import (
     frame,
     switches,
 )
+from vegtool.preview.correction import SIDES, Correction, smoothed
 from vegtool.preview.eye import Eye
 from vegtool.preview.options import FadeMode
 from vegtool.preview.stock import STOCK
 from vegtool.tiles.library import Species
 
-TURNS = (3, 16)
-"""From how many sides a plant is seen: few where it is large, many where few pixels show it."""
+FEW = 3
+"""Sides that a large plant is seen from."""
+SMALL_PX = 75.0
+"""Pixels across, up to which a plant is seen from all SIDES."""
 ALONG_FADE = (0.0, 0.3, 0.6, 1.0)
 """Of a fade range: where plants are compared."""
 ROUNDS = 2
@@ -48,8 +52,6 @@ FAR = 1e6
 """Times its distance: a plant that does not vanish."""
 LARGEST_PX, TRUTH_PX = 400, 160
 """Pixels across, at most, of pictures of what is drawn and of the plant itself."""
-MANY_PX = 300
-"""Pixels across of all pictures of a plant together, at least."""
 FLAT = 8.0
 """Radii of a plant from which on perspective hardly matters."""
 CLOSEST = 1.2
@@ -89,54 +91,78 @@ def corrected(
     levels = switches(kinds, 1.0)
     at = distances(levels, kind)
     stage = levels.stage(np.full(len(at), kind), at.astype(np.float32))
-    factor = np.ones(len(at))
+    factor = np.ones((len(at), SIDES))
     with Landscape([np.zeros((8, 8), np.uint8)], ctx=landscape.ctx) as truth:
         truth.add(species.levels[0], elements, mipmaps=False)
         wanted = _wanted(truth, kinds, kind, at, focal_px)
-        yield 1 / len(at), (stage, factor)  # nearer than the first, nothing is left out
+        yield 1 / len(at), Correction(stage, factor)  # nearer than the first, nothing is left out
         for i, distance in enumerate(at[1:], start=1):
-            views = _views(kinds, kind, float(distance), focal_px, LARGEST_PX)
-            factor[i] = factor[i - 1]
+            count = _sides(kinds, kind, float(distance), focal_px)
+            views = _views(kinds, kind, float(distance), focal_px, LARGEST_PX, count)
+            found = factor[i - 1] if count == SIDES else np.full(count, factor[i - 1].mean())
             for _ in range(ROUNDS):
-                only = np.zeros(1), np.full(1, factor[i])
-                tried = replace(kinds, corrections=(only,) * len(kinds.count))
-                drawn = 0.0
-                for view in views:
-                    what = chosen(view[2], tried, 1.0, fade)
-                    drawn += _covered(landscape, frame(view[2], what), view, 1, MSAA)
-                drawn /= len(views)
-                ratio = wanted[i] / drawn if drawn > 0 and wanted[i] > 0 else 1.0
-                factor[i] = np.clip(factor[i] * ratio**0.5, 1 / LARGEST, LARGEST)
-            yield (i + 1) / len(at), (stage, factor)
+                drawn = np.array(
+                    [
+                        _drawn(landscape, kinds, view, each, fade)
+                        for view, each in zip(views, found, strict=True)
+                    ]
+                )
+                true = wanted[i] if count == SIDES else np.full(count, wanted[i].mean())
+                if count < SIDES:
+                    drawn = np.full(count, drawn.mean())
+                ratio = np.ones(count)
+                np.divide(true, drawn, out=ratio, where=(drawn > 0) & (true > 0))
+                change = np.log(ratio) / 2
+                if count == SIDES:
+                    change = smoothed(change)
+                found = np.clip(found * np.exp(change), 1 / LARGEST, LARGEST)
+            factor[i] = found if count == SIDES else found.mean()
+            yield (i + 1) / len(at), Correction(stage, factor)
+
+
+def _drawn(landscape: Landscape, kinds: Kinds, view: View, factor: float, fade: FadeMode) -> float:
+    """What a plant covers whose lengths are changed by a factor."""
+    only = Correction(np.zeros(1), np.full((1, SIDES), factor))
+    tried = replace(kinds, corrections=(only,) * len(kinds.count))
+    what = chosen(view[2], tried, 1.0, fade)
+    return _covered(landscape, frame(view[2], what), view, 1, MSAA)
 
 
 def _wanted(
     truth: Landscape, kinds: Kinds, kind: int, at: FloatArray, focal_px: float
 ) -> FloatArray:
-    """(k,) steradians, nearly, that the plant itself covers from distances (k,), the mean of all
-    views."""
+    """(k, SIDES) steradians, nearly, that the plant itself covers from distances (k,): from each
+    side, or, nearby, the mean of few of them."""
 
-    def covered(distance: float) -> float:
-        views = _views(kinds, kind, distance, focal_px, TRUTH_PX)
+    def covered(distance: float, count: int) -> FloatArray:
+        views = _views(kinds, kind, distance, focal_px, TRUTH_PX, count)
         areas = [_covered(truth, _whole(view[2]), view, SUPERSAMPLE, 0) for view in views]
-        return sum(areas) / len(areas)
+        return np.array(areas) if count == SIDES else np.full(SIDES, np.mean(areas))
 
     radius = float(kinds.radius[kind])
     near, far = FLAT * radius, FLAT**2 * radius
-    found = np.array([covered(float(d)) if d < near else 0.0 for d in at])
+    found = np.array([covered(float(d), FEW) if d < near else np.zeros(SIDES) for d in at])
     if (at >= near).any():
         # from afar a plant covers a / d^2 + b / d^4: what perspective does to it fades
-        areas = [covered(d) * d**2 for d in (near, far)]
+        areas = [covered(d, SIDES) * d**2 for d in (near, far)]
         bent = (areas[0] - areas[1]) / (near**-2.0 - far**-2.0)
         flat = areas[1] - bent * far**-2.0
-        found = np.where(at >= near, (flat + bent / at**2) / at**2, found)
+        away = at[:, None]
+        found = np.where(away >= near, (flat + bent / away**2) / away**2, found)
     return found
 
 
-def _views(kinds: Kinds, kind: int, distance: float, focal_px: float, most: int) -> list[View]:
-    """A plant that far away, from all around; most: pixels of a picture."""
-    pixels = 2 * float(kinds.radius[kind]) * focal_px / max(distance, 1e-9)
-    count = int(np.clip(np.ceil(MANY_PX / max(pixels, 1e-9)), *TURNS))
+def _sides(kinds: Kinds, kind: int, distance: float, focal_px: float) -> int:
+    """From how many sides a plant so far away is compared."""
+    radius = float(kinds.radius[kind])
+    small = 2 * radius * focal_px / max(distance, 1e-9) <= SMALL_PX
+    return SIDES if small and distance >= FLAT * radius else FEW
+
+
+def _views(
+    kinds: Kinds, kind: int, distance: float, focal_px: float, most: int, count: int
+) -> list[View]:
+    """A plant that far away, from `count` sides; most: pixels of a picture."""
     turns = 2 * np.pi * np.arange(count) / count
     return [_view(kinds, kind, distance, float(turn), focal_px, most) for turn in turns]
 

@@ -26,6 +26,7 @@ from vegtool.arrays import FloatArray, IntArray
 from vegtool.elements import Elements
 from vegtool.gl.instances import INSTANCE, WHOLE
 from vegtool.gl.landscape import Batch, Frame
+from vegtool.preview.correction import Correction, sides_of
 from vegtool.preview.options import FadeMode
 from vegtool.preview.reveal import threshold_of
 from vegtool.preview.stock import STOCK, Stock
@@ -61,9 +62,6 @@ BEYOND = 4.0
 """Times the distance of the last level: along it, stages go on (`Switches.stage`)."""
 NO_LEVEL = 255
 """Of a plant that was not drawn yet."""
-
-Correction = tuple[FloatArray, FloatArray]
-"""(k,) stages (`Switches.stage`), ascending, and (k,) factors of lengths there (calibrate.py)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -307,7 +305,8 @@ def chosen(
     whole = np.ones(len(of)) if held is not None else _share_whole(at, kind[of], drawn, away[of])
     kept, enlarged = whole * WHOLE, whole**-GROWTH
     if held is None:
-        enlarged *= _lengths(kinds, kind, at.stage(kind, away))[of]
+        side = sides_of(found.place, found.rows["turn"])
+        enlarged *= _lengths(kinds, kind, at.stage(kind, away), side)[of]
     shown, solid = np.full(len(of), 2.0), np.ones(len(of))
     by_elements = kinds.opaque[kind[of], drawn] | (drawn == 0)
     fading = np.concatenate([share < 1, np.ones(len(fades), bool)])
@@ -332,12 +331,12 @@ def _share_whole(at: Switches, kind: np.ndarray, level: np.ndarray, away: np.nda
     return np.asarray(np.clip((until / away) ** 2, fewest, 1.0))
 
 
-def _lengths(kinds: Kinds, kind: np.ndarray, stage: np.ndarray) -> np.ndarray:
+def _lengths(kinds: Kinds, kind: np.ndarray, stage: np.ndarray, side: np.ndarray) -> np.ndarray:
     """(n,) factor of the lengths of elements."""
     result = np.ones(len(kind))
-    for index, (at, factor) in enumerate(kinds.corrections):
+    for index, correction in enumerate(kinds.corrections):
         here = np.flatnonzero(kind == index)
-        result[here] = np.interp(stage[here], at, factor)
+        result[here] = correction.at(stage[here], side[here])
     return result
 
 

@@ -23,7 +23,6 @@ from vegtool.preview.calibrate import corrected
 from vegtool.preview.choice import (
     NO_LEVEL,
     Chosen,
-    Correction,
     Kinds,
     Seen,
     chosen,
@@ -31,6 +30,7 @@ from vegtool.preview.choice import (
     kinds_of,
     seen,
 )
+from vegtool.preview.correction import NONE, Correction
 from vegtool.preview.eye import Eye
 from vegtool.preview.options import FadeMode
 from vegtool.preview.palette import PALETTE, Color
@@ -100,7 +100,7 @@ class Forest(OnGpu):
             steps = corrected(
                 plain, one, index, self._elements[index][0], landscape, CALIBRATED_PX, self.fade
             )
-            found: Correction = np.zeros(1), np.ones(1)
+            found = NONE
             for share, found in steps:  # noqa: B007  # the last one is the whole
                 yield (done + share * len(one.levels)) / total
             done += len(one.levels)
