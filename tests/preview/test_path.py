@@ -387,6 +387,18 @@ def test_what_cannot_be_recorded_is_refused() -> None:
     assert len(eyes(recorded([eye], [5.0]))) == 1
 
 
+@pytest.mark.parametrize("pitch", [7e-189, 1e-13, 1e-300])
+@pytest.mark.parametrize("others", [0, 1])
+def test_a_turn_of_next_to_nothing_takes_no_time(pitch: float, others: int) -> None:
+    """Back and forth, at the same place: slopes that no number can say are none."""
+    stations = [Station((1.0, 1.0, 0.0)), Station((1.0, 1.0, 0.0), pitch_deg=pitch)]
+    stations += [Station((0.0, 0.0, 0.0))] * others
+    path = CameraPath(tuple(stations), loop=True, speed_m_s=1e5)
+    found = eyes(path, fps=1000 / max(duration_s(path), 1e-6))
+    np.testing.assert_array_equal(found[0].position, [1, 1, 0])
+    assert all(abs(eye.pitch_deg) <= 90 for eye in found)
+
+
 NUMBERS = st.floats(-1e6, 1e6) | st.sampled_from([0.0, 1.0, 1.0, 1e-9, 1e6])
 
 

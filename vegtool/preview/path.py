@@ -108,6 +108,11 @@ class CameraPath:
         return file_and_line(self.source, self.lines, ("station", station, key))
 
 
+NO_TIME, NO_TIME_S = 1e-12, 1e-100
+"""Of a whole way, and seconds: a leg that takes less is as one that takes none, for what turns in
+it turns faster than numbers can say."""
+
+
 @dataclass(frozen=True, eq=False)
 class _Walk:
     """A path with the ground under it. Of each station, and of the first again where the path leads
@@ -347,7 +352,8 @@ def _directions(walk: _Walk, time_s: FloatArray) -> tuple[FloatArray, FloatArray
     from scipy.interpolate import PchipInterpolator
 
     angles = np.stack([walk.yaw_deg, walk.pitch_deg], axis=1)
-    later = np.concatenate([[True], np.diff(walk.time_s) > 0])  # a leg may take no time
+    least = max(NO_TIME * float(walk.time_s[-1] - walk.time_s[0]), NO_TIME_S)
+    later = np.concatenate([[True], np.diff(walk.time_s) > least])  # a leg may take no time
     times, angles = walk.time_s[later], angles[later]
     if len(times) == 1:
         found = np.repeat(angles[-1:], len(time_s), axis=0)
