@@ -20,7 +20,7 @@ from vegtool.tiles.stand import Stand
 STEP = 2**0.125
 """Ratio of the distances that are tried."""
 TRIES = 96
-"""Of them: to 4,096 times the distance."""
+"""Of them: to 3,756 times the distance."""
 
 
 def switches(species: Sequence[Species], display: Display) -> FloatArray:

@@ -34,7 +34,7 @@ VIEWS = tuple(
 
 
 def group_of(quarters: Sequence[Plant], places: Sequence[FloatArray], name: str) -> Plant:
-    """Quarters as one plant, each moved by (3,) metres; the same material is one."""
+    """Quarters as one plant, each moved by (3,) metres, with the materials of each."""
     materials: list[Material] = []
     arrays: dict[str, list[np.ndarray]] = {
         key: [] for key in ("positions", "normals", "uvs", "faces", "face_material", "colors")
