@@ -32,9 +32,12 @@ MAY_IMPORT: dict[str, set[str]] = {
     "measure": {"gl", "lighting"},
     "baselines": {"formats", "baking", "gl", "measure"},
     "refine": {"branches", "clustering", "boxes", "gl", "baking", "lighting", "measure"},
-    "tiles": {"scene", "formats", "baking", "gl", "measure", "refine", "tangents"},
+    "tiles": {
+        "scene", "formats", "baking", "gl", "measure", "refine", "tangents", "console", "workers",
+    },
     "convert": {"clustering", "boxes", "gl", "baking", "lighting", "measure", "refine"},
-    "batch": {"convert", "formats", "measure"},
+    "workers": set(),
+    "batch": {"convert", "formats", "measure", "workers"},
     "scene": {"convert", "lighting"},
     "preview": {
         "elements", "formats", "gl", "lighting", "measure", "scene", "tiles",

@@ -13,7 +13,7 @@ BOSS = """
 import os, signal
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
-from vegtool.batch import _in_worker
+from vegtool.workers import _in_worker
 
 if __name__ == "__main__":
     spawn = get_context("spawn")

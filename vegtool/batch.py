@@ -5,18 +5,15 @@ One bad file does not stop the others, and each file's outputs appear whole or n
 
 from __future__ import annotations
 
-import os
 import re
-import signal
-import threading
 import traceback
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import nullcontext
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from vegtool.convert import ConvertOptions, convert
 from vegtool.errors import InputError, UsageError, VegtoolError, unknown
@@ -24,9 +21,6 @@ from vegtool.formats import READERS, ReadOptions, read_plant
 from vegtool.lod import LodChain, ShadowProxy
 from vegtool.measure.options import MeasureOptions
 from vegtool.progress import Progress, silent
-
-if TYPE_CHECKING:
-    from multiprocessing.synchronize import Event
 
 
 @dataclass(frozen=True)
@@ -166,27 +160,18 @@ def convert_files(
         for job in jobs:
             yield _outcome(job, task, progress(job))
         return
-    from concurrent.futures import ProcessPoolExecutor
     from concurrent.futures.process import BrokenProcessPool
-    from multiprocessing import get_context
 
-    # spawn: a GL context does not survive a fork
-    spawn = get_context("spawn")
-    stop = spawn.Event()
-    with ProcessPoolExecutor(min(workers, len(jobs)), spawn, _in_worker, (stop,)) as pool:
-        try:
-            with _uninterrupted():
-                futures = [pool.submit(_outcome, job, task, _or_stop) for job in jobs]
-            for done, (job, future) in enumerate(zip(jobs, futures, strict=True), start=1):
-                try:
-                    yield future.result()
-                except BrokenProcessPool:
-                    yield Outcome(job, error=f"{job.source}: {_WORKER_DIED}", exit_code=1)
-                progress(job)("done", done / len(jobs))
-        except BaseException:
-            stop.set()
-            pool.shutdown(cancel_futures=True)
-            raise
+    from vegtool.workers import Processes
+
+    with Processes(min(workers, len(jobs))) as crew:
+        futures = crew.submit(_outcome, [(job, task, _or_stop) for job in jobs])
+        for done, (job, future) in enumerate(zip(jobs, futures, strict=True), start=1):
+            try:
+                yield future.result()
+            except BrokenProcessPool:
+                yield Outcome(job, error=f"{job.source}: {_WORKER_DIED}", exit_code=1)
+            progress(job)("done", done / len(jobs))
 
 
 _NOTHING_TO_PACK = (
@@ -197,54 +182,13 @@ _WORKER_DIED = (
     "the process that converted it, or one beside it, was ended from outside, mostly for want of"
     " memory; fewer files at a time (-j) need less"
 )
-_stop: Event | None = None
-"""In a worker: set once the whole batch is to end."""
-
-
-def _in_worker(stop: Event) -> None:
-    """What a worker does first: leave Ctrl-C to the process that started it, and end with it."""
-    global _stop
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    _stop = stop
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    """Not to wait without end for work from a process that was killed."""
-    from multiprocessing import parent_process
-
-    parent = parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
 
 
 def _or_stop(stage: str, fraction: float) -> None:
-    """A worker's progress: its chance to end, and to leave nothing half-written."""
-    if _stop is not None and _stop.is_set():
-        raise KeyboardInterrupt
+    """A worker's progress."""
+    from vegtool.workers import check_stop
 
-
-@contextmanager
-def _uninterrupted() -> Iterator[None]:
-    """Processes are started whole: one half-started would be waited for without end.
-
-    They begin deaf to Ctrl-C, which a terminal sends to all of them; other signals wait.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    came: list[int] = []
-    others = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
-    before = {number: signal.signal(number, lambda n, frame: came.append(n)) for number in others}
-    before[signal.SIGINT] = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler or signal.SIG_DFL)
-    for number in came:
-        signal.raise_signal(number)
+    check_stop()
 
 
 def _plant_of_level(name: str) -> str | None:

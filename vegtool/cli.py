@@ -25,7 +25,7 @@ from vegtool.formats import ReadOptions
 from vegtool.measure.options import MeasureOptions
 from vegtool.preview.options import PreviewOptions
 from vegtool.report.options import ReportOptions
-from vegtool.tiles.options import TileOptions
+from vegtool.tiles.options import RunOptions, TileOptions
 
 app = typer.Typer(
     name="vegtool",
@@ -407,6 +407,31 @@ def tiles_command(
     ],
     out: Out,
     tiles: TileOptions,
+    jobs: Annotated[
+        int | None,
+        typer.Option(
+            "-j", "--jobs", help="Processes [one to each core].", min=1, show_default=False
+        ),
+    ] = None,
+    dask: Annotated[
+        str | None,
+        typer.Option(
+            "--dask",
+            help="Scheduler of a Dask cluster that sees the same files, in place of processes "
+            "here.",
+            metavar="ADDRESS",
+        ),
+    ] = None,
+    only: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--only", help="Make this tile alone; may be repeated.", metavar="LEVEL/COLUMN/ROW"
+        ),
+    ] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Say how many tiles, bytes and seconds it would be.")
+    ] = False,
+    force: Force = False,
     json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = 0,
@@ -418,13 +443,24 @@ def tiles_command(
 
         vegtool tiles trees.csv --species library/ -o tiles/
 
-        vegtool tiles scene.toml --species library/ -o tiles/
+        vegtool tiles scene.toml --species library/ -o tiles/ --dry-run
+
+        vegtool preview tiles/
     """
     from vegtool.tiles.command import run_tiles
 
     console = Console(-1 if quiet else verbose, json)
-    result = run_tiles(source, species, out, tiles, console.bar, console.say)
+    how = RunOptions(jobs, dask, tuple(only or ()), dry_run, force)
+    result = run_tiles(source, species, out, tiles, how, console.bar, console.say)
+    for one in result.failed:
+        console.say(f"error: {one.message}", at=-1)
+        console.say(one.trace, at=2)
     console.result(result.facts, result.text)
+    if result.failed:
+        raise BatchError(
+            f"{len(result.failed):,} tiles could not be made; the others are there, and the same "
+            "command tries again"
+        )
 
 
 @app.command("doctor")

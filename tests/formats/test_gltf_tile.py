@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 from cards import cards, texture, together
+from shared_models import shared_model
 
 from vegtool.arrays import unit
 from vegtool.formats import png, read_plant
 from vegtool.formats.gltf_data import open_gltf
 from vegtool.formats.gltf_tile import Instances, SheetFiles, instanced_glb, merged_glb
-from vegtool.formats.shared_model import SharedModel, shared_model
+from vegtool.formats.shared_model import SharedModel
 from vegtool.lod import Triangles
 from vegtool.plant import Material, Plant
 from vegtool.seeding import generator
@@ -253,7 +254,7 @@ def stand(count: int) -> Stand:
     return Stand(
         rng.uniform(-16, 16, (count, 3)), np.zeros(count, np.int32), rng.uniform(0.5, 2, count),
         rng.uniform(0, 6, count), rng.uniform(0.9, 1.1, (count, 3)).astype(np.float32),
-        np.arange(count),
+        np.arange(count), np.zeros(count, np.int64),
     )  # fmt: skip
 
 

@@ -12,11 +12,12 @@ from urllib.parse import unquote
 import numpy as np
 import pytest
 from cards import arrays_of, cards, texture, together
+from shared_models import shared_model
 
 from vegtool.formats import read_plant
 from vegtool.formats.glb import Document
 from vegtool.formats.gltf import plant_glb
-from vegtool.formats.shared_model import SharedModel, shared_model
+from vegtool.formats.shared_model import SharedModel
 from vegtool.plant import Material, Plant
 from vegtool.seeding import generator
 
@@ -187,7 +188,7 @@ def test_the_same_plant_gives_the_same_files_and_stays_as_it_is() -> None:
 def test_a_model_far_from_its_foot_is_no_model() -> None:
     """Its node would move it, and instances have no such node."""
     far = replace(tree(), positions=tree().positions + np.array([1000.0, 0, 0]))
-    with pytest.raises(ValueError, match="shared_model tree: a model far from its origin"):
+    with pytest.raises(ValueError, match="model_files tree: a model far from its origin"):
         shared_model(far, "tree", "shared/")
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from vegtool.formats.glb import Document
-from vegtool.formats.tileset import TileEntry, tileset_json
+from vegtool.formats.tileset import TileEntry, tileset_files
 from vegtool.formats.tileset_check import check_tileset
 
 
@@ -31,7 +31,7 @@ def tileset(folder: Path) -> Path:
         document.show(document.add("nodes", name=name))
         (folder / "tiles" / f"{name}.glb").write_bytes(document.glb())
     path = folder / "tileset.json"
-    path.write_bytes(tileset_json(root, None))
+    path.write_bytes(tileset_files(root, None)["tileset.json"])
     return path
 
 

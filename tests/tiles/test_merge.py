@@ -41,6 +41,7 @@ def stand(count: int, seed: int = 0, away: npt.ArrayLike = (0, 0, 0)) -> Stand:
         rng.uniform(-20, 20, (count, 3)) + np.asarray(away, np.float64),
         np.zeros(count, np.int32), rng.uniform(0.5, 2.0, count), rng.uniform(0, 2 * pi, count),
         rng.uniform(0.85, 1.14, (count, 3)).astype(np.float32), np.arange(count),
+        np.zeros(count, np.int64),
     )  # fmt: skip
 
 

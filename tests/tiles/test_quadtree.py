@@ -46,8 +46,8 @@ def inside(tree: Quadtree, node: Node, tiles: Tiles) -> list[int]:
 
 def test_one_tile_is_the_root() -> None:
     tree = quadtree_of(on_cells([3, -2]), SIDE)
-    assert (tree.depth, tree.nodes(0), tree.below) == (0, [Node(0, 0, 0)], {})
-    assert tree.tile == {Node(0, 0, 0): 0}
+    assert (tree.depth, tree.nodes(0)) == (0, [Node(0, 0, 0)])
+    assert tree.quarters(Node(0, 0, 0)) == () and tree.tiles_of(Node(0, 0, 0)).tolist() == [0]
     assert tree.middle(Node(0, 0, 0)).tolist() == [3.5 * SIDE, -1.5 * SIDE]
 
 
@@ -60,6 +60,18 @@ def test_the_root_is_the_least_power_of_two_that_holds_all(across: int, depth: i
         tree = quadtree_of(on_cells(cells), SIDE)
         assert (tree.depth, tree.side(0), tree.side(depth)) == (depth, SIDE * 2**depth, SIDE)
         assert [tree.height(level) for level in (0, depth)] == [depth, 0]
+
+
+def test_levels_above_hold_what_the_least_root_does() -> None:
+    """Each of twice the side, with one quarter on which there are plants."""
+    cells = scattered()
+    tree, more = quadtree_of(on_cells(cells), SIDE), quadtree_of(on_cells(cells), SIDE, above=3)
+    assert (more.depth, more.side(3)) == (tree.depth + 3, tree.side(0))
+    for level in range(3):
+        assert more.nodes(level) == [Node(level, 0, 0)]
+        assert more.quarters(Node(level, 0, 0)) == (Node(level + 1, 0, 0),)
+        assert len(more.tiles_of(Node(level, 0, 0))) == len(cells)
+    assert more.middle(Node(3, 0, 0)).tolist() == tree.middle(Node(0, 0, 0)).tolist()
 
 
 def test_a_border_belongs_to_the_square_that_begins_there() -> None:
@@ -80,7 +92,7 @@ def test_squares_are_where_tiles_are_row_by_row() -> None:
             wanted.add((row, column))
         assert tree.nodes(level) == [Node(level, c, r) for r, c in sorted(wanted)]
     assert tree.nodes(0) == [Node(0, 0, 0)]
-    assert set(tree.tile) == set(tree.nodes(tree.depth)), "the last level is that of the tiles"
+    assert len(tree.nodes(tree.depth)) == len(tree.cell), "the last level is that of the tiles"
 
 
 def test_tiles_of_a_square_lie_on_it() -> None:
@@ -88,15 +100,17 @@ def test_tiles_of_a_square_lie_on_it() -> None:
     tree = quadtree_of(tiles, SIDE)
     for node in all_nodes(tree):
         assert tree.tiles_of(node).tolist() == inside(tree, node, tiles), str(node)
-    for node, index in tree.tile.items():
-        assert tree.tiles_of(node).tolist() == [index]
+    for node in tree.nodes(tree.depth):
+        (index,) = tree.tiles_of(node)
         np.testing.assert_allclose(tree.middle(node), tiles.low[index, [0, 2]], atol=1e-9)
+    for absent in (Node(tree.depth, 2**tree.depth, 0), Node(0, 1, 0), Node(1, 0, 2)):
+        assert not len(tree.tiles_of(absent))
 
 
 def test_every_tile_of_a_square_is_on_exactly_one_of_its_quarters() -> None:
     tree = quadtree_of(on_cells(scattered()), SIDE)
     for node in all_nodes(tree):
-        quarters = tree.below.get(node, ())
+        quarters = tree.quarters(node)
         if node.level == tree.depth:
             assert not quarters, "a tile has none"
             continue
@@ -108,8 +122,8 @@ def test_every_tile_of_a_square_is_on_exactly_one_of_its_quarters() -> None:
 
 def test_a_quarter_is_a_quarter_of_its_square() -> None:
     tree = quadtree_of(on_cells(scattered()), SIDE)
-    for node, quarters in tree.below.items():
-        for one in quarters:
+    for node in all_nodes(tree):
+        for one in tree.quarters(node):
             away = np.abs(tree.middle(one) - tree.middle(node))
             np.testing.assert_allclose(away, tree.side(node.level) / 4, rtol=1e-12)
 
@@ -119,8 +133,8 @@ def test_moved_tiles_have_moved_squares() -> None:
     here, there = (quadtree_of(on_cells(c), SIDE) for c in (cells, cells + np.array([1000, -3])))
     np.testing.assert_array_equal(here.cell, there.cell)
     assert (there.first - here.first).tolist() == [1000, -3]
-    assert here.below == there.below
     for node in all_nodes(here):
+        assert here.quarters(node) == there.quarters(node)
         moved = there.middle(node) - here.middle(node)
         assert moved.tolist() == [1000 * SIDE, -3 * SIDE]
 
@@ -130,7 +144,8 @@ def test_the_order_of_tiles_does_not_matter_and_they_stay_as_they_are() -> None:
     tiles = on_cells(cells)
     before = tiles.low.tobytes(), tiles.high.tobytes()
     tree, other = quadtree_of(tiles, SIDE), quadtree_of(on_cells(cells[::-1]), SIDE)
-    assert all_nodes(tree) == all_nodes(other) and tree.below == other.below
+    assert all_nodes(tree) == all_nodes(other)
+    assert all(tree.quarters(node) == other.quarters(node) for node in all_nodes(tree))
     assert (tiles.low.tobytes(), tiles.high.tobytes()) == before
 
 
@@ -149,4 +164,4 @@ def test_every_tile_of_a_placement_has_a_square_of_its_own(tmp_path: Path) -> No
     placement = placed(tmp_path, head + f"extent_m = [{4 * side + 0.02}, 60]", SIDE)
     assert placement.tile_m == side
     tree = quadtree_of(placement.tiles, side)
-    assert len(tree.tile) == len(placement.tiles)
+    assert len(tree.nodes(tree.depth)) == len(placement.tiles)

@@ -90,6 +90,7 @@ def stand_of(kinds: npt.ArrayLike, scale: npt.ArrayLike = 1.0) -> Stand:
     return Stand(
         np.zeros((count, 3)), kind, np.broadcast_to(np.asarray(scale, np.float64), count).copy(),
         np.zeros(count), np.ones((count, 3), np.float32), np.arange(count),
+        np.zeros(count, np.int64),
     )  # fmt: skip
 
 

@@ -6,8 +6,9 @@ import json
 import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,13 +31,15 @@ from vegtool.plant import Material, Plant
 from vegtool.progress import Progress, silent
 from vegtool.seeding import generator
 from vegtool.tiles.command import run_tiles
-from vegtool.tiles.make import Tile, make_tile
-from vegtool.tiles.options import TileOptions
+from vegtool.tiles.jobs import TILES, Made, World, file_of
+from vegtool.tiles.journal import Entry
+from vegtool.tiles.make import chosen, merged_tile
+from vegtool.tiles.options import RunOptions, TileOptions
 from vegtool.tiles.placement import Placement, Plants
 from vegtool.tiles.pyramid import Pyramid, pyramid_of, used_levels
-from vegtool.tiles.quadtree import Node
-from vegtool.tiles.run import file_of, write_tiles
-from vegtool.tiles.shared import shared_of
+from vegtool.tiles.quadtree import Node, quadtree_of
+from vegtool.tiles.run import Run
+from vegtool.tiles.shared import Shared
 from vegtool.tiles.source import scene_at
 
 SIDE, COUNT = 64.0, 40
@@ -103,9 +106,45 @@ def pyramid(
     """Four tiles, of which the root is merged, unless options say otherwise."""
     folder.mkdir(parents=True, exist_ok=True)
     inventory(folder, heights, away)
-    values = {"tile": 32.0, "near": 1} | options
+    values = {"tile": 32.0, "near": 1, "near_triangles": 10**9} | options
     scene = scene_of(folder, TWO_SPECIES + PLACED)
-    return pyramid_of(scene, library(folder, single), TileOptions(**values))  # type: ignore[arg-type]
+    made = pyramid_of(scene, library(folder, single), TileOptions(**values))  # type: ignore[arg-type]
+    # without the squares above, of which there would be two or three
+    return replace(made, tree=quadtree_of(made.placement.tiles, made.placement.tile_m))
+
+
+@dataclass(frozen=True)
+class Tile:
+    """A tile that is written: which, what is told of it, its bytes, and what took how long."""
+
+    node: Node
+    entry: Entry
+    data: bytes
+    seconds: dict[str, float]
+
+    def __getattr__(self, name: str) -> Any:
+        return self.entry.facts[name]
+
+
+def world(made: Pyramid, out: Path) -> World:
+    return World(made, Shared(made, out / TILES), out)
+
+
+def write_tiles(made: Pyramid, out: Path) -> list[Tile]:
+    """All tiles with plants on them, the smallest first."""
+    run = Run(world(made, out))
+    outcomes = list(run.tiles())
+    assert not run.failed
+    run.finish()
+    tiles = [
+        Tile(
+            node := Node(*map(int, one.entry.name.split("/"))), one.entry,
+            (out / file_of(node)).read_bytes(), one.seconds,
+        )
+        for one in outcomes
+        if isinstance(one, Made) and one.entry.facts.get("plants")
+    ]  # fmt: skip
+    return sorted(tiles, key=lambda tile: -tile.node.level)
 
 
 @pytest.fixture(scope="module")
@@ -113,7 +152,7 @@ def four(tmp_path_factory: pytest.TempPathFactory) -> tuple[Pyramid, Path, list[
     """Four tiles and their root, written."""
     folder = tmp_path_factory.mktemp("four")
     made = pyramid(folder)
-    return made, folder / "out", list(write_tiles(made, folder / "out"))
+    return made, folder / "out", write_tiles(made, folder / "out")
 
 
 @pytest.fixture(scope="module")
@@ -121,7 +160,7 @@ def sixteen(tmp_path_factory: pytest.TempPathFactory) -> tuple[Pyramid, Path, li
     """Tiles of 16 m, at most, and two levels of merged ones."""
     folder = tmp_path_factory.mktemp("sixteen")
     made = pyramid(folder, tile=16.0, plain=True)
-    return made, folder / "out", list(write_tiles(made, folder / "out"))
+    return made, folder / "out", write_tiles(made, folder / "out")
 
 
 @pytest.fixture(params=["four", "sixteen"])
@@ -143,14 +182,15 @@ def files(folder: Path) -> dict[str, bytes]:
 def standing(made: Pyramid, node: Node) -> list[Plant]:
     """The plants on a square one by one, in metres from its origin, each as the last level whose
     switch distance, times its scale, is no farther than what the square is made for."""
-    away, found = made.made_for_m(made.tree.height(node.level)), []
+    height = made.tree.height(node.level)
+    away, found = made.made_for_m(height), []
     for number in made.tree.tiles_of(node):
         on = made.placement.plants(int(number))
         for k, foot in enumerate(feet(on)):
             one = made.species[on.species[k]]
             scale = 1.0 if np.isnan(on.height[k]) else float(on.height[k]) / one.height
             level = sum(bool(at * scale <= away) for at in one.switch_m) - 1
-            level = min(max(level, 1), len(one.levels) - 1)
+            level = min(max(level, made.finest(height)), len(one.levels) - 1)
             place = foot - made.origin(node)
             found.append(turned(one.levels[level], float(on.yaw[k]), scale, place))
     return found
@@ -184,7 +224,7 @@ def test_every_plant_is_once_on_every_level(written: Written) -> None:
         seen = np.concatenate([made.stand(tile.node).row for tile in at])
         assert sorted(seen.tolist()) == list(range(1, COUNT + 1))
     for tile in tiles:
-        quarters = made.tree.below.get(tile.node, ())
+        quarters = made.tree.quarters(tile.node)
         if quarters:
             own = [set(made.stand(one).row.tolist()) for one in quarters]
             assert sum(map(len, own)) == len(set.union(*own)) == tile.plants
@@ -225,14 +265,13 @@ def test_instances_stand_where_plants_do(four: Written) -> None:
 
 
 def test_tiles_say_how_they_were_made_and_what_they_cost(four: Written) -> None:
-    made, folder, tiles = four
+    _, folder, tiles = four
     assert [tile.kind for tile in tiles] == ["instances"] * 4 + ["merged"]
     for tile in tiles:
         values = open_gltf(folder / file_of(tile.node)).json
         drawn = [node for node in values["nodes"] if "mesh" in node]
         draws = sum(len(values["meshes"][node["mesh"]]["primitives"]) for node in drawn)
         assert tile.draws == draws and (tile.kind != "merged" or draws == 1)
-    assert len({id(model) for model in shared_of(made, range(2)).models.values()}) <= 3
 
 
 def test_nothing_is_outside_of_its_box(written: Written) -> None:
@@ -255,16 +294,16 @@ def test_errors_grow_with_squares_and_are_seen_where_these_take_over(written: Wr
 
 
 def test_a_square_shows_no_level_that_is_not_at_hand(written: Written) -> None:
-    made, _, _ = written
-    heights = range(made.tree.depth + 1)
-    shared = shared_of(made, heights)
-    for height in heights:
-        pairs = used_levels(made, [height])
+    made, folder, _ = written
+    shared = Shared(made, folder / TILES)
+    for height in range(made.tree.depth + 1):
+        pairs = used_levels(made, height)
         for kind, level in pairs:
             if made.instanced(height):
-                assert (kind, level) in shared.models
+                name = shared.model_name(kind, level)
+                assert shared.model(kind, level).uri == f"shared/{name}.bin"
             else:
-                assert shared.sheets[height].part[kind, level] == pairs.index((kind, level))
+                assert shared.sheet(height).part[kind, level] == pairs.index((kind, level))
 
 
 @pytest.mark.parametrize("plain", [False, True])
@@ -273,7 +312,7 @@ def test_a_second_run_gives_the_same_bytes(tmp_path: Path, plain: bool) -> None:
     found = []
     for name in ("one", "two"):
         made = pyramid(tmp_path / name, plain=plain)
-        list(write_tiles(made, tmp_path / f"{name} out"))
+        (write_tiles(made, tmp_path / f"{name} out"))
         found.append(files(tmp_path / f"{name} out"))
     assert found[0] == found[1] and len(found[0]) > 10
 
@@ -283,7 +322,7 @@ def test_written_over_is_as_written_anew(tmp_path: Path, four: Written) -> None:
     made, folder, _ = four
     shutil.copytree(folder, tmp_path / "again")
     held = [plants.offset.tobytes() for plants in map(made.placement.plants, range(4))]
-    list(write_tiles(made, tmp_path / "again"))
+    (write_tiles(made, tmp_path / "again"))
     assert files(tmp_path / "again") == files(folder)
     assert held == [plants.offset.tobytes() for plants in map(made.placement.plants, range(4))]
 
@@ -293,8 +332,10 @@ def test_a_moved_landscape_has_the_same_tiles_at_another_place(
 ) -> None:
     """By whole tiles: quarters of metres are exact that far away, too; boxes to a micrometre."""
     away = 1024 * 32.0
-    list(write_tiles(pyramid(tmp_path, away=away), tmp_path / "out"))
+    (write_tiles(pyramid(tmp_path, away=away), tmp_path / "out"))
     here, there = files(four[1]), files(tmp_path / "out")
+    logs = [one.pop("journal.jsonl").splitlines() for one in (here, there)]
+    assert logs[0][:-1] == logs[1][:-1], "keys are of what is on a tile, not of where it is"
     old, new = (
         json.loads(one.pop("tileset.json"), parse_float=lambda text: round(float(text), 6))["root"]
         for one in (here, there)
@@ -308,12 +349,12 @@ def test_a_moved_landscape_has_the_same_tiles_at_another_place(
 def test_all_near_tiles_share_their_models(tmp_path: Path) -> None:
     """With instances to the top, there is no sheet, and each model's vertices are there once."""
     made = pyramid(tmp_path, near=16)
-    tiles = list(write_tiles(made, tmp_path / "out"))
+    tiles = write_tiles(made, tmp_path / "out")
     assert {tile.kind for tile in tiles} == {"instances"}
     names = sorted(path.name for path in (tmp_path / "out" / "tiles" / "shared").iterdir())
     assert not [name for name in names if name.startswith("sheet")]
     assert [n for n in names if n.endswith(".bin")] == [
-        "ash_LOD1.bin", "ash_LOD2.bin", "pine_LOD1.bin",
+        "ash_0.bin", "ash_1.bin", "ash_2.bin", "pine_1.bin",
     ]  # fmt: skip
     assert check_tileset(tmp_path / "out" / "tileset.json") == []
 
@@ -328,17 +369,11 @@ def test_one_tile_is_a_tileset(tmp_path: Path) -> None:
 def test_a_merged_tile_has_no_more_triangles_than_it_may(tmp_path: Path) -> None:
     """Plants are coarser then: 100 of 2 or 4 triangles each are too many at 16 m."""
     made = pyramid(tmp_path, heights=("30",), tile=32.0)
-    free = list(write_tiles(made, tmp_path / "free"))[-1]
+    free = (write_tiles(made, tmp_path / "free"))[-1]
     assert free.triangles == len(corners(standing(made, free.node))) > 2 * COUNT
     capped = replace(made, options=replace(made.options, triangles=2 * COUNT))
-    tight = list(write_tiles(capped, tmp_path / "tight"))[-1]
+    tight = (write_tiles(capped, tmp_path / "tight"))[-1]
     assert (tight.kind, tight.triangles) == ("merged", 2 * COUNT)
-
-
-def test_nothing_is_written_before_it_is_asked_for(tmp_path: Path) -> None:
-    made = pyramid(tmp_path)
-    write_tiles(made, tmp_path / "out")
-    assert not (tmp_path / "out").exists()
 
 
 def test_a_run_is_told_in_numbers(tmp_path: Path) -> None:
@@ -352,13 +387,16 @@ def test_a_run_is_told_in_numbers(tmp_path: Path) -> None:
 
     path, plants = inventory(tmp_path, HIGH), library(tmp_path)
     result = run_tiles(
-        path, plants, tmp_path / "out", TileOptions(tile=32.0, near=1), bar, told.append
-    )
+        path, plants, tmp_path / "out", TileOptions(tile=32.0, near=1), RunOptions(1), bar,
+        told.append,
+    )  # fmt: skip
     facts = result.facts
-    assert (facts["plants"], len(facts["tiles"])) == (COUNT, 5)
-    assert facts["tiles"][-1]["tile"] == "0/0/0" and facts["tiles"][-1]["plants"] == COUNT
-    assert facts["bytes"] == sum(map(len, files(tmp_path / "out").values()))
-    assert result.text.startswith(f"{tmp_path / 'out' / 'tileset.json'}: 5 tiles, ")
+    assert (facts["plants"], len(facts["tiles"]), facts["made"]) == (COUNT, 7, 7)
+    assert {row["plants"] for row in facts["levels"]} == {COUNT}
+    written = files(tmp_path / "out")
+    assert facts["bytes"] == sum(map(len, written.values())) - len(written["journal.jsonl"])
+    begin = f"{tmp_path / 'out' / 'tileset.json'}: {COUNT} plants, 7 tiles, "
+    assert result.text.startswith(begin)
     json.dumps(facts)
 
 
@@ -416,7 +454,7 @@ def clustered(tmp_path_factory: pytest.TempPathFactory) -> Written:
     """A root that has room for fewer triangles than plants, whatever their level."""
     folder = tmp_path_factory.mktemp("clustered")
     made = pyramid(folder, tile=16.0, triangles=48)
-    return made, folder / "out", list(write_tiles(made, folder / "out"))
+    return made, folder / "out", write_tiles(made, folder / "out")
 
 
 @pytest.mark.gl
@@ -469,7 +507,7 @@ def test_a_square_without_plants_is_no_error(tmp_path: Path) -> None:
     empty = made.tree.tiles_of(first).tolist()
     gone = sum(len(made.placement.plants(tile)) for tile in empty)
     there = replace(made, placement=Emptied(made.placement, empty))
-    tiles = list(write_tiles(there, tmp_path / "out"))
+    tiles = write_tiles(there, tmp_path / "out")
     assert check_tileset(tmp_path / "out" / "tileset.json") == []
     assert tiles[-1].plants == COUNT - gone
 
@@ -489,7 +527,7 @@ def test_plants_without_a_height_are_in_their_box(tmp_path: Path) -> None:
 def test_plants_without_a_height_have_their_levels(tmp_path: Path) -> None:
     """At 16 m, where an ash of 3 m is a level finer than one of half a metre."""
     made = pyramid(tmp_path, heights=LOW)
-    tiles = list(write_tiles(made, tmp_path / "out"))
+    tiles = write_tiles(made, tmp_path / "out")
     assert sum(tile.plants for tile in tiles) == 2 * COUNT
 
 
@@ -500,7 +538,8 @@ def test_a_merged_plant_without_a_height_is_no_other_plant(tmp_path: Path) -> No
     slow = [replace(one, switch_m=6.0 * one.switch_m) for one in made.species]
     made = replace(made, species=tuple(slow))
     root = made.tree.nodes(0)[0]
-    tile = make_tile(made, root, shared_of(made, range(1, 2)), lambda node: slow[0].levels[0])
+    shared, stand = Shared(made, tmp_path), made.stand(root)
+    tile = merged_tile(made, shared, root, stand, chosen(made, shared, root, stand).level)
     assert tile.triangles == len(corners(standing(made, root)))
 
 
@@ -513,11 +552,10 @@ def test_plants_of_one_name_keep_their_files(tmp_path: Path) -> None:
     inventory(tmp_path, HIGH)
     scene = scene_of(tmp_path, tables + PLACED)
     made = pyramid_of(scene, tmp_path, TileOptions(tile=32.0, near=1))
-    shared = shared_of(made, range(1))
-    assert len(shared.models) == 2
-    for model in shared.models.values():
-        for name, data in model.files.items():
-            assert shared.files[name] == data, name
+    shared = Shared(made, tmp_path)
+    names = [shared.model_name(kind, 0).lower() for kind in range(2)]
+    assert len(set(names)) == 2
+    assert not set(shared.model_files(0, 0)) & set(shared.model_files(1, 0))
 
 
 def test_sides_count(tmp_path: Path) -> None:
@@ -526,7 +564,7 @@ def test_sides_count(tmp_path: Path) -> None:
     names = [name for *_, name in rows()]
     room = 4 * names.count("ash") + 2 * names.count("pine")
     made = pyramid(tmp_path, heights=("30",), single=["pine"], triangles=room)
-    root = list(write_tiles(made, tmp_path / "out"))[-1]
+    root = (write_tiles(made, tmp_path / "out"))[-1]
     assert root.kind == "merged" and root.triangles <= room
 
 
@@ -543,7 +581,7 @@ def test_plants_that_rules_leave_out_are_not_told_of(tmp_path: Path) -> None:
 
     result = run_tiles(
         tmp_path / "scene.toml", library(tmp_path), tmp_path / "out",
-        TileOptions(tile=32.0, near=1), bar, lambda text: None,
+        TileOptions(tile=32.0, near=1), RunOptions(1), bar, lambda text: None,
     )  # fmt: skip
     drawn = result.facts["tiles"][-1]["plants"]
     assert 0 < drawn == result.facts["plants"]

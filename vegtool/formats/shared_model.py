@@ -10,6 +10,7 @@ import json
 import re
 from copy import deepcopy
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from vegtool.formats.glb import Document
@@ -22,13 +23,12 @@ ENDINGS = {"image/png": ".png", "image/jpeg": ".jpg", "image/webp": ".webp"}
 @dataclass(frozen=True, eq=False)
 class SharedModel:
     """name: of its node. objects: glTF objects, by kind. uri, length: its buffer's file, relative
-    to the tiles, and that file's bytes. files: by file name, what is to be written."""
+    to the tiles, and that file's bytes."""
 
     name: str
     objects: dict[str, Any]
     uri: str
     length: int
-    files: dict[str, bytes]
 
     def add_to(self, document: Document) -> int:
         """Add the model; returns its mesh."""
@@ -61,8 +61,8 @@ class SharedModel:
         return document.add("meshes", **mesh)
 
 
-def shared_model(plant: Plant, name: str, folder: str) -> SharedModel:
-    """A plant or a level as files in `folder`, a path from the tiles with a slash at its end."""
+def model_files(plant: Plant, name: str) -> dict[str, bytes]:
+    """A plant or a level as files: NAME.gltf, its buffer NAME.bin, and its pictures."""
     stem = plain_name(name)
     document = plant_document(plant, name)
     binary, objects = document.binary, deepcopy(document.objects)
@@ -91,14 +91,23 @@ def shared_model(plant: Plant, name: str, folder: str) -> SharedModel:
     for accessor in objects["accessors"]:
         accessor["bufferView"] = place[accessor["bufferView"]]
     if any("translation" in node for node in objects["nodes"]):
-        raise ValueError(f"shared_model {name}: a model far from its origin cannot be instanced")
+        raise ValueError(f"model_files {name}: a model far from its origin cannot be instanced")
     files[f"{stem}.bin"] = bytes(kept)
     files[f"{stem}.gltf"] = _alone(objects, stem, len(kept))
+    return files
+
+
+def read_shared(path: Path, folder: str) -> SharedModel:
+    """A model whose files are written: its .gltf file, and `folder`, a path from the tiles to it
+    with a slash at its end."""
+    objects = json.loads(path.read_bytes())
+    (buffer,) = objects.pop("buffers")
+    (node,) = objects["nodes"]
     for image in objects.get("images", []):
         image["uri"] = folder + image["uri"]
     for kind in ("scene", "scenes", "asset", "nodes"):
         del objects[kind]
-    return SharedModel(name, objects, f"{folder}{stem}.bin", len(kept), files)
+    return SharedModel(node["name"], objects, folder + buffer["uri"], buffer["byteLength"])
 
 
 def plain_name(name: str) -> str:

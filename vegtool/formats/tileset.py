@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import PurePosixPath
 from typing import Any
 
 import numpy as np
@@ -17,14 +18,20 @@ import numpy as np
 import vegtool
 from vegtool.arrays import FloatArray
 
+MOST = 2000
+"""Tiles that one file lists; of more, clients would wait for what they do not look at."""
+APART = 5
+"""Levels of tiles in one of several files: 341 tiles."""
+TILESET = "tileset.json"
+
 
 @dataclass(frozen=True, eq=False)
 class TileEntry:
-    """uri: of its file. origin: (3,) metres in the scene's frame, y up. bounds: (2, 3) metres
-    there, least and greatest corner, which hold the children's. error_m: geometric error. plants:
-    on it. feet_m: lowest and highest of where they stand."""
+    """uri: of its file, or None of a tile without content. origin: (3,) metres in the scene's
+    frame, y up. bounds: (2, 3) metres there, least and greatest corner, which hold the children's.
+    error_m: geometric error. plants: on it. feet_m: lowest and highest of where they stand."""
 
-    uri: str
+    uri: str | None
     origin: FloatArray
     bounds: FloatArray
     error_m: float
@@ -33,36 +40,64 @@ class TileEntry:
     children: Sequence[TileEntry] = ()
 
 
-def tileset_json(root: TileEntry, placed: FloatArray | None) -> bytes:
-    """The file. placed: (4, 4) from the scene's frame, z up, to the earth's; None where it has no
-    place there. The tileset's own error is twice the root's: it is not drawn where it has none."""
+def tileset_files(root: TileEntry, placed: FloatArray | None) -> dict[str, bytes]:
+    """TILESET and, where there are many tiles, others that it refers to, beside the tiles.
+
+    placed: (4, 4) from the scene's frame, z up, to the earth's; None where it has no place there.
+    """
     base = np.eye(4) if placed is None else placed
-    top = _tile(root)
+    files: dict[str, bytes] = {}
+    apart = APART if _count(root) > MOST else None
+    top = _tile(root, "", apart, 0, files)
     top["transform"] = _columns(base @ _translation(root.origin))
-    top["refine"] = "REPLACE"
+    files[TILESET] = _file(top, root)
+    return files
+
+
+def _count(tile: TileEntry) -> int:
+    return 1 + sum(map(_count, tile.children))
+
+
+def _file(top: dict[str, Any], root: TileEntry) -> bytes:
+    """A tileset's own error is twice its root's: it is not drawn where it has none."""
     values = {
         "asset": {"version": "1.1", "generator": f"vegtool {vegtool.__version__}"},
         "geometricError": 2 * root.error_m or 1.0,
-        "root": top,
+        "root": {**top, "refine": "REPLACE"},
     }
     return (json.dumps(values, allow_nan=False, separators=(",", ":")) + "\n").encode()
 
 
-def _tile(tile: TileEntry) -> dict[str, Any]:
+def _tile(
+    tile: TileEntry, folder: str, apart: int | None, depth: int, files: dict[str, bytes]
+) -> dict[str, Any]:
+    """A tile as a file in `folder` has it; its children, where those are `apart` levels below, in
+    files of their own."""
     low, high = _turned(tile.bounds - tile.origin)
     low, high = np.minimum(low, high), np.maximum(low, high)
     half = np.diag((high - low) / 2)
     found: dict[str, Any] = {
         "boundingVolume": {"box": [*((low + high) / 2).tolist(), *half.ravel().tolist()]},
         "geometricError": tile.error_m,
-        "content": {"uri": tile.uri},
         "extras": {"plants": tile.plants, "feet_m": [tile.feet_m[0], tile.feet_m[1]]},
     }
-    if tile.children:
-        found["children"] = [
-            {"transform": _columns(_translation(child.origin - tile.origin))} | _tile(child)
-            for child in tile.children
-        ]
+    if tile.uri is not None:
+        found["content"] = {"uri": tile.uri.removeprefix(folder)}
+    children = []
+    for child in tile.children:
+        place = {"transform": _columns(_translation(child.origin - tile.origin))}
+        if apart and child.uri and child.children and (depth + 1) % apart == 0:
+            path = PurePosixPath(child.uri).with_suffix(".json")
+            within = f"{path.parent}/"
+            top = _tile(child, within, apart, depth + 1, files)
+            files[str(path)] = _file(top, child)
+            told = {key: top[key] for key in ("boundingVolume", "geometricError", "extras")}
+            refers = {"content": {"uri": str(path).removeprefix(folder)}}
+            children.append({**place, **told, **refers})
+        else:
+            children.append({**place, **_tile(child, folder, apart, depth + 1, files)})
+    if children:
+        found["children"] = children
     return found
 
 

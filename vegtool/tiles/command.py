@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager
+import os
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from vegtool.errors import OutputError, UsageError
 from vegtool.progress import Progress
-from vegtool.tiles.options import TileOptions
+from vegtool.tiles.options import RunOptions, TileOptions
+
+if TYPE_CHECKING:
+    from vegtool.tiles.jobs import Failed, Inputs, World
+    from vegtool.tiles.run import Each
 
 Bar = Callable[[str], AbstractContextManager[Progress]]
 """What shows progress, under a title, as long as it is open."""
@@ -18,52 +25,113 @@ Bar = Callable[[str], AbstractContextManager[Progress]]
 
 @dataclass(frozen=True)
 class Result:
-    """facts: for machines. text: for people."""
+    """facts: for machines. text: for people. failed: parts that could not be made. exit_code: 3
+    where some were made."""
 
     facts: dict[str, Any]
     text: str
+    failed: tuple[Failed, ...] = ()
+    exit_code: int = 0
 
 
 def run_tiles(
-    path: Path, library: Path, folder: Path, options: TileOptions, bar: Bar,
+    scene: Path, library: Path, out: Path, options: TileOptions, run: RunOptions, bar: Bar,
     say: Callable[[str], None],
 ) -> Result:  # fmt: skip
-    """Make the tiles of a scene or an inventory.
+    """Make the tiles of a scene or an inventory, or, in a dry run, say what they would be.
 
     Raises UsageError and InputError for what is missing or broken, OutputError where nothing can be
     written, CapabilityError where nothing can draw.
     """
-    from vegtool.tiles.pyramid import pyramid_of
-    from vegtool.tiles.run import TILESET, write_tiles
-    from vegtool.tiles.source import scene_at
+    from vegtool.tiles.jobs import Inputs, world_of
 
     started = perf_counter()
+    inputs = Inputs(scene.absolute(), library.absolute(), out.absolute(), options)
+    _check_out(inputs, run.force)
+    with bar("reading") as progress:
+        world = world_of(inputs, progress)
+    for note in world.pyramid.notes:
+        say(note)
     with bar("tiles") as progress:
-        pyramid = pyramid_of(scene_at(path, library), library, options, progress)
-        for note in pyramid.notes:
-            say(note)
-        rows = [
-            {
-                "tile": str(tile.node),
-                "kind": tile.kind,
-                "plants": tile.plants,
-                "triangles": tile.triangles,
-                "bytes": len(tile.data),
-                "draws": tile.draws,
-                "error_m": tile.error_m,
-                "seconds": {key: round(value, 4) for key, value in tile.seconds.items()},
-            }
-            for tile in write_tiles(pyramid, folder, progress)
-        ]
-    seconds = perf_counter() - started
-    size = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
-    facts = {
-        "tileset": str(folder / TILESET),
-        "plants": rows[-1]["plants"],
-        "bytes": size,
-        "seconds": round(seconds, 2),
-        "tiles": rows,
-        "notes": list(pyramid.notes),
-    }
-    lines = [f"{facts['tileset']}: {len(rows):,} tiles, {size / 1e6:,.1f} MB, {seconds:,.1f} s"]
-    return Result(facts, "\n".join(lines))
+        if run.dry_run:
+            from vegtool.tiles.estimate import estimated
+
+            facts, text = estimated(world, _processes(world, run), progress)
+            return Result(facts, text)
+        with _crew(inputs, world, run) as each:
+            return _made(world, each, run, progress, out, started)
+
+
+def _made(
+    world: World, each: Each, run: RunOptions, progress: Progress, out: Path, started: float
+) -> Result:
+    from vegtool.tiles.jobs import Made
+    from vegtool.tiles.report import facts_of, text_of
+    from vegtool.tiles.run import Run, node_of
+
+    only = [node_of(name, world.pyramid) for name in run.only]
+    work = Run(world, each, progress)
+    made = [
+        outcome
+        for outcome in (work.only(only) if only else work.tiles())
+        if isinstance(outcome, Made)
+    ]
+    files = [] if only else work.finish()
+    facts = facts_of(world, made, work.failed, out, files, perf_counter() - started)
+    failed = tuple(work.failed.values())
+    if failed and not any(one.entry.facts for one in made):
+        return Result(facts, "", failed, failed[0].exit_code)
+    return Result(facts, text_of(facts), failed, 3 if failed else 0)
+
+
+@contextmanager
+def _crew(inputs: Inputs, world: World, run: RunOptions) -> Iterator[Each]:
+    """Who makes the tiles."""
+    from vegtool.tiles.jobs import do, do_at
+    from vegtool.workers import Alone, Processes
+
+    if run.dask is not None:
+        if run.jobs is not None:
+            raise UsageError("--dask: is in place of processes here; leave out -j")
+        from vegtool.tiles.cluster import Cluster
+
+        with Cluster(run.dask) as cluster:
+            yield partial(cluster.each, partial(do_at, inputs))
+        return
+    count = _processes(world, run)
+    if count <= 1:
+        yield partial(Alone().each, partial(do, world))
+        return
+    with Processes(count) as processes:
+        yield partial(processes.each, partial(do_at, inputs))
+
+
+def _processes(world: World, run: RunOptions) -> int:
+    """No more than there is work for."""
+    from vegtool.tiles.run import blocks
+
+    parts = len(run.only) or len(blocks(world.pyramid))
+    return min(run.jobs or os.cpu_count() or 1, parts)
+
+
+def _check_out(inputs: Inputs, force: bool) -> None:
+    """Raise OutputError where the tiles would go over something else."""
+    from vegtool.formats.atomic import check_free
+    from vegtool.tiles.jobs import TILES
+    from vegtool.tiles.journal import JOURNAL
+    from vegtool.tiles.run import BEGINS
+
+    own = (inputs.out / JOURNAL).exists()
+    begin = BEGINS[inputs.options.format]
+    check_free(inputs.out, [begin, JOURNAL], force or own, (inputs.scene, inputs.library / begin))
+    for path in (inputs.scene, inputs.library):
+        if path.resolve().is_relative_to((inputs.out / TILES).resolve()):
+            raise OutputError(
+                f"{inputs.out / TILES}: is where tiles are to go, and {path} is in it. Choose "
+                "another place."
+            )
+    if not own and not force and (inputs.out / TILES).exists():
+        raise OutputError(
+            f"{inputs.out / TILES}: exists already, and no run of vegtool tiles says that it made "
+            "it. Overwrite it with -f, or choose another place."
+        )

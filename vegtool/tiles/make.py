@@ -1,21 +1,22 @@
-"""One tile: the bytes of its file, from the plants on its square or from its quarters' files."""
+"""One tile: the bytes of its file, from the plants on its square or from its quarters."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from vegtool.arrays import FloatArray
+from vegtool.arrays import FloatArray, IntArray
 from vegtool.formats.gltf import level_glb
 from vegtool.formats.gltf_tile import Instances, instanced_glb, merged_glb
 from vegtool.plant import Plant
-from vegtool.tiles.levels import fitting, level_at
+from vegtool.tiles.levels import fitting
 from vegtool.tiles.merge import merged
-from vegtool.tiles.pyramid import FINEST, Pyramid
+from vegtool.tiles.pyramid import Pyramid
 from vegtool.tiles.quadtree import Node
 from vegtool.tiles.shared import Shared
+from vegtool.tiles.stand import Stand
 from vegtool.timing import timed
 
 COARSEST = 2.0
@@ -30,7 +31,7 @@ class Tile:
     """data: of its .glb file. plants: on the square. triangles, draws: what a client draws. kind:
     how it was made. error_m: how far from its place anything is drawn, for 95 % of it; None where
     that was not measured. bounds: (2, 3) metres in the scene's frame, where what is drawn may reach
-    beyond the plants."""
+    beyond the plants. seconds: by step."""
 
     node: Node
     data: bytes
@@ -43,26 +44,67 @@ class Tile:
     seconds: dict[str, float] = field(default_factory=dict)
 
 
-def make_tile(
-    pyramid: Pyramid, node: Node, shared: Shared, quarter: Callable[[Node], Plant | None]
-) -> Tile | None:
-    """Make a tile; None where no plants turn out to stand on it. quarter: the plant that a tile
-    made before is, as a client loads it."""
+@dataclass(frozen=True, eq=False)
+class Chosen:
+    """(n,) int32 the level of each plant on a square, and how many times farther away than it is a
+    plant is as whose it is drawn."""
+
+    level: IntArray
+    times: float
+
+    @property
+    def too_coarse(self) -> bool:
+        """Whether too little is left of each plant."""
+        return self.times > COARSEST
+
+
+def chosen(pyramid: Pyramid, shared: Shared, node: Node, stand: Stand) -> Chosen:
+    """What the plants on a square are drawn as: one plant at least."""
     height = pyramid.tree.height(node.level)
-    if pyramid.instanced(height):
-        return _instanced(pyramid, node, shared)
-    sheet = shared.sheets[height]
+    near = pyramid.instanced(height)
+    of_level = pyramid.of_level if near else shared.sheet(height).triangles
+    most = pyramid.options.near_triangles if near else pyramid.budget(node)
+    found = fitting(
+        stand, pyramid.switch_m, of_level, pyramid.made_for_m(height), most,
+        pyramid.finest(height),
+    )  # fmt: skip
+    return Chosen(*found)
+
+
+def instanced_tile(
+    pyramid: Pyramid, shared: Shared, node: Node, stand: Stand, level: IntArray
+) -> Tile:
+    """Plants as instances of the models of their levels."""
     seconds: dict[str, float] = {}
-    with timed(seconds, "placement"):
-        stand = pyramid.stand(node)
-        if not len(stand):
-            return None
-        level, times = fitting(
-            stand, pyramid.switch_m, sheet.triangles, pyramid.made_for_m(height),
-            pyramid.options.triangles, FINEST,
-        )  # fmt: skip
-    if times > COARSEST and not pyramid.instanced(height - 1):
-        return _reclustered(pyramid, node, len(stand), quarter)
+    with timed(seconds, "writing"):
+        pair, which = np.unique(
+            np.stack([stand.species, level], axis=1), axis=0, return_inverse=True
+        )
+        origin = pyramid.origin(node)
+        drawn = []
+        for index, (kind, number) in enumerate(pair.tolist()):
+            here = np.flatnonzero(which.ravel() == index)
+            drawn.append(
+                Instances(
+                    shared.model(kind, number),
+                    stand.foot[here] - origin,
+                    stand.yaw[here],
+                    stand.scale[here],
+                    stand.tint[here],
+                )
+            )
+        data = instanced_glb(drawn, str(node))
+    triangles = int(pyramid.of_level[stand.species, level].sum())
+    draws = sum(len(one.model.objects["meshes"][0]["primitives"]) for one in drawn)
+    return Tile(node, data, "instances", len(stand), triangles, draws, 0.0, seconds=seconds)
+
+
+def merged_tile(
+    pyramid: Pyramid, shared: Shared, node: Node, stand: Stand, level: IntArray
+) -> Tile:
+    """Plants as one mesh with one material."""
+    sheet = shared.sheet(pyramid.tree.height(node.level))
+    seconds: dict[str, float] = {}
     with timed(seconds, "merging"):
         part = sheet.part[stand.species, level]
         group = merged(stand, part, sheet.sheet.parts, pyramid.origin(node))
@@ -71,51 +113,24 @@ def make_tile(
     return Tile(node, data, "merged", len(stand), len(group.indices) // 3, 1, seconds=seconds)
 
 
-def _instanced(pyramid: Pyramid, node: Node, shared: Shared) -> Tile | None:
-    stand = pyramid.stand(node)
-    if not len(stand):
-        return None
-    height = pyramid.tree.height(node.level)
-    level = level_at(stand, pyramid.switch_m, pyramid.made_for_m(height), FINEST)
-    pair, which = np.unique(np.stack([stand.species, level], axis=1), axis=0, return_inverse=True)
-    origin = pyramid.origin(node)
-    drawn = []
-    for index, (kind, number) in enumerate(pair.tolist()):
-        here = np.flatnonzero(which.ravel() == index)
-        drawn.append(
-            Instances(
-                shared.models[kind, number],
-                stand.foot[here] - origin,
-                stand.yaw[here],
-                stand.scale[here],
-                stand.tint[here],
-            )
-        )
-    triangles = int(pyramid.of_level[stand.species, level].sum())
-    draws = sum(len(one.model.objects["meshes"][0]["primitives"]) for one in drawn)
-    return Tile(
-        node, instanced_glb(drawn, str(node)), "instances", len(stand), triangles, draws, 0.0
-    )
-
-
-def _reclustered(
-    pyramid: Pyramid, node: Node, plants: int, quarter: Callable[[Node], Plant | None]
+def reclustered_tile(
+    pyramid: Pyramid, node: Node, quarters: Sequence[tuple[Node, Plant]], plants: int
 ) -> Tile:
+    """What stands for the quarters, given as a client loads them, on which are so many plants.
+
+    Raises CapabilityError where nothing can draw.
+    """
     from vegtool.measure.pictures import client_plant
     from vegtool.tiles.recluster import group_of, reclustered
 
     tree, options = pyramid.tree, pyramid.options
     origin = pyramid.origin(node)
-    seconds: dict[str, float] = {}
-    with timed(seconds, "quarters"):
-        read = {one: quarter(one) for one in tree.below[node]}
-        there = {one: plant for one, plant in read.items() if plant is not None}
-        places = [pyramid.origin(one) - origin for one in there]
-        group = group_of(list(there.values()), places, str(node))
+    places = [pyramid.origin(one) - origin for one, _ in quarters]
+    group = group_of([plant for _, plant in quarters], places, str(node))
     away = pyramid.from_m(tree.height(node.level)) + SEEN_FROM * tree.side(node.level)
-    level = reclustered(group, options.triangles, away, pyramid.display, options.max_texture)
+    level = reclustered(group, pyramid.budget(node), away, pyramid.display, options.max_texture)
     error = None if level.geometric_error_m is None else level.geometric_error_m[1]
     return Tile(
         node, level_glb(level, str(node)), "reclustered", plants, level.triangles, 1, error,
-        client_plant(level).bounds + origin, {**seconds, **level.seconds},
+        client_plant(level).bounds + origin, dict(level.seconds),
     )  # fmt: skip

@@ -6,9 +6,10 @@ of a picture then show a square, and as many squares fill it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from hashlib import blake2b
+from math import ceil, log
 from pathlib import Path
 
 import numpy as np
@@ -32,10 +33,12 @@ FROM = 1.0
 """Sides of a square: from where on it is drawn."""
 CLIENT_PX = 16.0
 """Screen-space error at which clients go on to the next level, unless told otherwise."""
-FINEST = 1
-"""Level: the original is for those who stand before a single plant."""
 NEAREST = 0.5
 """Sides of a tile: distance that its plants' levels are for, where nothing is nearer."""
+HANDFUL = 16
+"""Triangles of a square so far away that it needs no square beyond."""
+PER_PLANT = 4
+"""Triangles that are enough of any plant from afar."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +52,12 @@ class Pyramid:
     display: Display
     crs: str | None = None
     notes: tuple[str, ...] = ()
+    _digests: dict[tuple[int, int], str] = field(default_factory=dict, repr=False)
+
+    @property
+    def placed(self) -> FloatArray | None:
+        """(4, 4) from the scene's frame, z up, to the earth's; None where it has no place there."""
+        return None
 
     @cached_property
     def switch_m(self) -> FloatArray:
@@ -59,6 +68,15 @@ class Pyramid:
     def of_level(self) -> FloatArray:
         """(s, l) triangles."""
         return triangles(self.species)
+
+    def digest(self, kind: int, level: int) -> str:
+        """Of a species' level, and of where it may be used."""
+        if (kind, level) not in self._digests:
+            one = self.species[kind]
+            found = blake2b(one.files[level].read_bytes(), digest_size=16)
+            found.update(repr((float(one.switch_m[level]), one.focal_px)).encode())
+            self._digests[kind, level] = found.hexdigest()
+        return self._digests[kind, level]
 
     def from_m(self, height: int) -> float:
         """Metres from which on squares of a height are drawn."""
@@ -76,6 +94,16 @@ class Pyramid:
     def instanced(self, height: int) -> bool:
         """Whether plants are instances of models."""
         return height < self.options.near
+
+    def finest(self, height: int) -> int:
+        """Level of which all others are coarser. The original is for the smallest tiles: it may
+        repeat its textures, which merged groups cannot."""
+        return 0 if height == 0 else 1
+
+    def budget(self, node: Node) -> int:
+        """Triangles of a square, at most: fewer where there are fewer tiles on it."""
+        covered = len(self.tree.tiles_of(node)) / 4.0 ** self.tree.height(node.level)
+        return max(HANDFUL, round(covered * self.options.triangles))
 
     def stand(self, node: Node) -> Stand:
         """The plants on a square."""
@@ -120,9 +148,9 @@ class Pyramid:
         count = len(self.species)
         each = Stand(
             np.zeros((count, 3)), np.arange(count, dtype=np.int32), self.largest, np.zeros(count),
-            np.ones((count, 3), np.float32), np.arange(count),
+            np.ones((count, 3), np.float32), np.arange(count), np.zeros(count, np.int64),
         )  # fmt: skip
-        found = level_at(each, self.switch_m, self.made_for_m(height), FINEST)
+        found = level_at(each, self.switch_m, self.made_for_m(height), self.finest(height))
         return [int(level) for level in found]
 
 
@@ -141,15 +169,24 @@ def pyramid_of(
             f"{scene.path}: expected plants, found none that stands on the ground of the scene. "
             "Check [placement], and where [[species]] may grow"
         )
-    tree = quadtree_of(placement.tiles, placement.tile_m)
+    tree = quadtree_of(placement.tiles, placement.tile_m, _above(placement, options))
     notes = (*terrain.notes, *placement.notes, *found.notes)
     return Pyramid(placement, found.species, tree, options, Display(), terrain.crs, notes)
 
 
-def used_levels(pyramid: Pyramid, heights: Sequence[int]) -> list[tuple[int, int]]:
-    """Species and levels that squares of these heights may show, in order."""
-    pairs = set()
-    for height in heights:
-        for kind, finest in enumerate(pyramid.finest_at(height)):
-            pairs |= {(kind, level) for level in range(finest, len(pyramid.species[kind].levels))}
-    return sorted(pairs)
+def _above(placement: Placement, options: TileOptions) -> int:
+    """Levels above the least square that holds all tiles, until a handful of triangles is enough of
+    it."""
+    least = quadtree_of(placement.tiles, placement.tile_m)
+    covered = len(placement.tiles) / 4.0**least.depth
+    wanted = min(covered * options.triangles, PER_PLANT * float(placement.tiles.count.sum()))
+    return max(0, ceil(log(wanted / HANDFUL, 4)))
+
+
+def used_levels(pyramid: Pyramid, height: int) -> list[tuple[int, int]]:
+    """Species and levels that squares of that height may show, in order."""
+    return [
+        (kind, level)
+        for kind, finest in enumerate(pyramid.finest_at(height))
+        for level in range(finest, len(pyramid.species[kind].levels))
+    ]

@@ -1,7 +1,9 @@
 """The pyramid of a landscape: squares of ground, each of four of half its side, down to tiles.
 
 Levels are counted from the root, as clients do; heights from the tiles of the placement, whose
-height is 0. A node is there where there are plants on it.
+height is 0. A node is there where there are plants on it. The tiles on a square are neighbours in
+the order of G. M. Morton, "A computer oriented geodetic data base" (1966), in which the bits of
+column and row take turns.
 """
 
 from __future__ import annotations
@@ -13,6 +15,15 @@ import numpy as np
 
 from vegtool.arrays import FloatArray
 from vegtool.tiles.placement import LongArray, Tiles
+
+SPREAD = (
+    (16, 0x0000FFFF0000FFFF),
+    (8, 0x00FF00FF00FF00FF),
+    (4, 0x0F0F0F0F0F0F0F0F),
+    (2, 0x3333333333333333),
+    (1, 0x5555555555555555),
+)
+"""Steps that put a zero between any two of 31 bits: how far to shift, and what then stays."""
 
 
 @dataclass(frozen=True, order=True)
@@ -55,31 +66,32 @@ class Quadtree:
         return self.depth - level
 
     @cached_property
-    def tile(self) -> dict[Node, int]:
-        """The tiles of the placement, by their squares."""
-        return {
-            Node(self.depth, int(column), int(row)): index
-            for index, (column, row) in enumerate(self.cell)
-        }
+    def _sorted(self) -> tuple[LongArray, LongArray]:
+        """(t,) codes, ascending, and the tiles that they are of."""
+        codes = _codes(self.cell)
+        order = np.argsort(codes, kind="stable")
+        return codes[order], order
 
     def nodes(self, level: int) -> list[Node]:
         """All squares of a level on which there are plants, row by row."""
         found = np.unique((self.cell >> self.height(level))[:, ::-1], axis=0)
         return [Node(level, int(column), int(row)) for row, column in found]
 
-    @cached_property
-    def below(self) -> dict[Node, tuple[Node, ...]]:
-        """The quarters, with plants on them, of every square that is no tile."""
-        found: dict[Node, list[Node]] = {}
-        for level in range(1, self.depth + 1):
-            for node in self.nodes(level):
-                found.setdefault(node.parent, []).append(node)
-        return {node: tuple(quarters) for node, quarters in found.items()}
-
     def tiles_of(self, node: Node) -> LongArray:
-        """(n,) the placement's tiles on a square, ascending."""
-        on = (self.cell >> self.height(node.level)) == (node.column, node.row)
-        return np.flatnonzero(on.all(axis=1)).astype(np.int64)
+        """(n,) the placement's tiles on a square, ascending; none where it is not there."""
+        codes, tiles = self._sorted
+        bits = 2 * self.height(node.level)
+        first = int(_codes(np.array([[node.column, node.row]]))[0]) << bits
+        start, end = np.searchsorted(codes, [first, first + (1 << bits)])
+        return np.sort(tiles[start:end])
+
+    def quarters(self, node: Node) -> tuple[Node, ...]:
+        """Those on which there are plants, row by row; none of a tile."""
+        if node.level == self.depth:
+            return ()
+        level, column, row = node.level + 1, 2 * node.column, 2 * node.row
+        four = [Node(level, column + x, row + z) for z in (0, 1) for x in (0, 1)]
+        return tuple(one for one in four if len(self.tiles_of(one)))
 
     def middle(self, node: Node) -> FloatArray:
         """(2,) metres along x and z in the scene's frame."""
@@ -87,12 +99,21 @@ class Quadtree:
         return np.asarray(corner + self.side(node.level) / 2 + self.first * self.side_m)
 
 
-def quadtree_of(tiles: Tiles, side_m: float) -> Quadtree:
-    """The least pyramid over tiles of that side, of which there is one at least."""
+def quadtree_of(tiles: Tiles, side_m: float, above: int = 0) -> Quadtree:
+    """The least pyramid over tiles of that side, of which there is one at least; and so many levels
+    above it."""
     cell = tiles.cell
     if cell is None:
         middle = (tiles.low + tiles.high)[:, [0, 2]] / 2
         cell = np.floor(middle / side_m).astype(np.int64)
     first = cell.min(axis=0)
     size = int((cell.max(axis=0) - first).max()) + 1
-    return Quadtree(side_m, max(size - 1, 0).bit_length(), first, cell - first)
+    return Quadtree(side_m, max(size - 1, 0).bit_length() + above, first, cell - first)
+
+
+def _codes(cell: LongArray) -> LongArray:
+    """(n,) Morton codes of columns and rows (n, 2) below 2^31."""
+    bits = np.array(cell, np.int64)
+    for shift, kept in SPREAD:
+        bits = (bits | (bits << shift)) & kept
+    return np.asarray(bits[:, 0] | (bits[:, 1] << 1))

@@ -1,102 +1,227 @@
-"""Tiles written to a folder: what they share, then all tiles, the smallest first, then the tileset.
+"""A tileset: what tiles share, then all tiles, the smallest first, then what clients begin with.
 
-Each file is whole or absent. Tiles of one height do not depend on each other.
+Each file is whole or absent, and the journal says which are there: a run that was interrupted goes
+on where it was, and one whose inputs have changed makes only what they change. Squares of one
+height do not depend on each other, so they are made side by side.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
-import numpy as np
-
-from vegtool.arrays import FloatArray
 from vegtool.errors import UsageError
-from vegtool.formats import read_plant
-from vegtool.formats.atomic import explained
-from vegtool.formats.tileset import TileEntry, tileset_json
-from vegtool.plant import Plant
+from vegtool.formats.tileset import TILESET, tileset_files
 from vegtool.progress import Progress, silent
-from vegtool.tiles.make import Tile, make_tile
-from vegtool.tiles.pyramid import Pyramid
+from vegtool.tiles.jobs import (
+    TILES,
+    BlockJob,
+    Failed,
+    FarJob,
+    Job,
+    ModelJob,
+    Outcome,
+    SheetJob,
+    TileJob,
+    World,
+    do,
+    name_of,
+    nodes_of,
+)
+from vegtool.tiles.journal import (
+    PART,
+    Entry,
+    appended,
+    read_journal,
+    write_file,
+    write_journal,
+)
+from vegtool.tiles.pyramid import Pyramid, used_levels
 from vegtool.tiles.quadtree import Node
-from vegtool.tiles.shared import FOLDER, shared_of
+from vegtool.tiles.tree import index_json, tree_of
+from vegtool.workers import Alone
 
-TILES, TILESET = "tiles", "tileset.json"
+Each = Callable[[Sequence[Job]], Iterator[tuple[Job, list[Outcome] | None]]]
+"""Does jobs, in any order; None where whoever did one was ended from outside."""
+LOST = (
+    "the process that made it was ended from outside, again and again, mostly for want of memory; "
+    "fewer processes (-j) need less"
+)
+COST = {ModelJob: 1.0, SheetJob: 8.0, TileJob: 1.0, BlockJob: 4.0, FarJob: 12.0}
+"""How long jobs take, beside each other."""
+BEGINS = {"3dtiles": TILESET, "glb": "index.json"}
+"""What readers begin with, by the format of the tiles."""
+TREE = "tree"
+"""What the journal calls that."""
 
 
-def file_of(node: Node) -> str:
-    """Of a tile, relative to the output folder."""
-    return f"{TILES}/{node.level}_{node.column}_{node.row}.glb"
+class Run:
+    """A tileset that is being made. found: the parts that are there, by name. failed: those that
+    are not, and why."""
 
+    def __init__(self, world: World, each: Each | None = None, progress: Progress = silent) -> None:
+        self.world, self.progress = world, progress
+        self.each = each or partial(Alone().each, partial(do, world))
+        self.found: dict[str, Entry] = {}
+        self.failed: dict[str, Failed] = {}
+        self._known = read_journal(world.out)
+        self._done, self._all = 0.0, _cost(world.pyramid)
 
-def write_tiles(pyramid: Pyramid, folder: Path, progress: Progress = silent) -> Iterator[Tile]:
-    """Make and write all tiles and what they share, then the tileset; yields each tile.
+    def tiles(self) -> Iterator[Outcome]:
+        """Make all parts, and yield what comes of each.
 
-    Raises OutputError where nothing can be written.
-    """
-    tree = pyramid.tree
-    progress("models", 0.0)
-    shared = shared_of(pyramid, range(tree.depth + 1))
-    for name, data in shared.files.items():
-        _write(folder / TILES / FOLDER / name, data)
-    levels = [tree.nodes(level) for level in range(tree.depth, -1, -1)]
-    plants: dict[Node, int] = {}
-    boxes: dict[Node, FloatArray] = {}
-    total, done = sum(map(len, levels)), 0
+        Raises OutputError where nothing can be written.
+        """
+        pyramid, out = self.world.pyramid, self.world.out
+        tree, top = pyramid.tree, _top(pyramid)
+        clean(out)
+        with appended(out) as write:
+            yield from self._do(models(pyramid), write)
+            yield from self._do(blocks(pyramid), write)
+            for height in range(top, tree.depth + 1):
+                nodes = tree.nodes(tree.depth - height)
+                if height > top:
+                    yield from self._do([self._far(node) for node in nodes], write)
+                entries = (self.found.get(str(node)) for node in nodes)
+                if any(entry and entry.facts.get("kind") == "merged" for entry in entries):
+                    yield from self._do([SheetJob(height=height)], write)
 
-    def quarter(node: Node) -> Plant | None:
-        return read_plant(folder / file_of(node)) if node in plants else None
+    def only(self, nodes: Sequence[Node]) -> Iterator[Outcome]:
+        """Make some tiles, with the models that they draw, and nothing else.
 
-    for nodes in levels:
+        Raises UsageError for one that is made of quarters which are not there.
+        """
+        tree, top = self.world.pyramid.tree, _top(self.world.pyramid)
+        jobs: list[Job] = []
         for node in nodes:
-            progress(f"tile {node}", done / total)
-            done += 1
-            tile = make_tile(pyramid, node, shared, quarter)
-            if tile is not None:
-                _write(folder / file_of(node), tile.data)
-                plants[node] = tile.plants
-                boxes[node] = _box(pyramid, tile, boxes)
-                yield tile
-    root = levels[-1][0]
-    if root not in plants:
+            if tree.height(node.level) <= top:
+                jobs.append(TileJob(node=node))
+                continue
+            quarters = tree.quarters(node)
+            for one in quarters:
+                if str(one) not in self._known or not self._known[str(one)].there(self.world.out):
+                    raise UsageError(
+                        f"--only {node}: expected its quarters, of which it may be made; {one} is "
+                        "not there. Make it first, or all tiles"
+                    )
+            jobs.append(
+                FarJob(node=node, quarters=tuple((q, self._known[str(q)]) for q in quarters))
+            )
+        clean(self.world.out)
+        with appended(self.world.out) as write:
+            yield from self._do(jobs, write)
+        self.progress("tiles", 1.0)
+
+    def finish(self) -> list[str]:
+        """Write what clients begin with, remove what this tileset no longer has, and put the
+        journal in order. The files' names, first the one to begin with.
+
+        Raises UsageError where there are no plants on any tile.
+        """
+        pyramid, out = self.world.pyramid, self.world.out
+        root = tree_of(pyramid, self.found)
+        if root is None:
+            if self.failed:
+                return []
+            raise UsageError(
+                "tiles: expected plants, found none that stands on the ground of the scene. Check "
+                "[placement], and where [[species]] may grow"
+            )
+        placed = pyramid.placed
+        if pyramid.options.format == "glb":
+            files = {BEGINS["glb"]: index_json(pyramid, root, placed)}
+        else:
+            files = tileset_files(root, placed)
+        begin = BEGINS[pyramid.options.format]
+        names = [begin, *(name for name in files if name != begin)]
+        for name in reversed(names):
+            write_file(out / name, files[name])
+        self.found[TREE] = Entry(TREE, "", {name: len(files[name]) for name in names})
+        self._forget()
+        write_journal(out, self.found)
+        return names
+
+    def _do(self, jobs: Sequence[Job], write: Callable[[Entry], None]) -> Iterator[Outcome]:
+        for job, outcomes in self.each([self._knowing(job) for job in jobs]):
+            name = name_of(job)
+            for outcome in outcomes or [Failed(name, f"{name}: {LOST}")]:
+                if isinstance(outcome, Failed):
+                    self.failed[outcome.name] = outcome
+                else:
+                    self.found[outcome.entry.name] = outcome.entry
+                    if outcome.again:
+                        write(outcome.entry)
+                yield outcome
+            self._done += COST[type(job)]
+            self.progress(name, min(self._done / self._all, 1.0))
+
+    def _knowing(self, job: Job) -> Job:
+        """A job with what the journal has of what it makes."""
+        names = [name_of(job)]
+        if isinstance(job, BlockJob):
+            names = [str(node) for node in nodes_of(self.world.pyramid.tree, job.node)]
+        return replace(job, known={n: self._known[n] for n in names if n in self._known})
+
+    def _far(self, node: Node) -> FarJob:
+        quarters = self.world.pyramid.tree.quarters(node)
+        return FarJob(node=node, quarters=tuple((q, self.found.get(str(q))) for q in quarters))
+
+    def _forget(self) -> None:
+        """Remove the files of parts that this tileset does not have, and an earlier one had."""
+        kept = {file for entry in self.found.values() for file in entry.files}
+        for entry in self._known.values():
+            for file in entry.files:
+                if file not in kept:
+                    (self.world.out / file).unlink(missing_ok=True)
+
+
+def node_of(name: str, pyramid: Pyramid) -> Node:
+    """The tile of a name such as 3/5/2: level, column and row. Raises UsageError where it has no
+    plants."""
+    match = re.fullmatch(r"(\d+)/(\d+)/(\d+)", name)
+    node = Node(*map(int, match.groups())) if match else None
+    if node is None or node.level > pyramid.tree.depth or not len(pyramid.tree.tiles_of(node)):
+        last = pyramid.tree.nodes(pyramid.tree.depth)[0]
         raise UsageError(
-            "tiles: expected plants, found none that stands on the ground of the scene. Check "
-            "[placement], and where [[species]] may grow"
+            f"--only {name}: expected LEVEL/COLUMN/ROW of a tile with plants, from 0/0/0 to those "
+            f"of level {pyramid.tree.depth}, such as {last}; there is none of that name"
         )
-    _write(folder / TILESET, tileset_json(_entry(pyramid, root, plants, boxes), None))
-    progress("tiles", 1.0)
+    return node
 
 
-def _box(pyramid: Pyramid, tile: Tile, boxes: dict[Node, FloatArray]) -> FloatArray:
-    """(2, 3) metres: of a tile's plants, of what is drawn of it, and of the tiles below."""
-    below = [boxes[one] for one in pyramid.tree.below.get(tile.node, ()) if one in boxes]
-    own = [] if tile.bounds is None else [tile.bounds]
-    all_of_them = np.stack([pyramid.bounds(tile.node), *own, *below])
-    return np.stack([all_of_them[:, 0].min(axis=0), all_of_them[:, 1].max(axis=0)])
+def clean(folder: Path) -> None:
+    """Remove what killed runs left half-written."""
+    for place in (folder, folder / TILES):
+        for part in (place.rglob if place != folder else place.glob)(f".*{PART}"):
+            part.unlink(missing_ok=True)
 
 
-def _entry(
-    pyramid: Pyramid, node: Node, plants: dict[Node, int], boxes: dict[Node, FloatArray]
-) -> TileEntry:
-    tiles, which = pyramid.placement.tiles, pyramid.tree.tiles_of(node)
-    feet = float(tiles.low[which, 1].min()), float(tiles.high[which, 1].max())
-    below = [one for one in pyramid.tree.below.get(node, ()) if one in plants]
-    return TileEntry(
-        file_of(node),
-        pyramid.origin(node),
-        boxes[node],
-        pyramid.error_m(pyramid.tree.height(node.level)),
-        plants[node],
-        feet,
-        tuple(_entry(pyramid, one, plants, boxes) for one in below),
+def _top(pyramid: Pyramid) -> int:
+    """Height of the blocks."""
+    return min(pyramid.options.near, pyramid.tree.depth)
+
+
+def models(pyramid: Pyramid) -> list[Job]:
+    near = range(min(pyramid.options.near, pyramid.tree.depth + 1))
+    pairs = {pair for height in near for pair in used_levels(pyramid, height)}
+    return [ModelJob(kind=kind, level=level) for kind, level in sorted(pairs)]
+
+
+def blocks(pyramid: Pyramid) -> list[BlockJob]:
+    tree = pyramid.tree
+    return [BlockJob(node=node) for node in tree.nodes(tree.depth - _top(pyramid))]
+
+
+def _cost(pyramid: Pyramid) -> float:
+    """Of all jobs."""
+    tree, top = pyramid.tree, _top(pyramid)
+    far = sum(len(tree.nodes(level)) for level in range(tree.depth - top))
+    return (
+        COST[ModelJob] * len(models(pyramid))
+        + COST[BlockJob] * len(blocks(pyramid))
+        + COST[FarJob] * far
+        + COST[SheetJob]
     )
-
-
-def _write(path: Path, data: bytes) -> None:
-    """A file, whole or not at all."""
-    with explained(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part = path.with_name(f".{path.name}.part")
-        part.write_bytes(data)
-        part.replace(path)

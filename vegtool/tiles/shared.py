@@ -1,40 +1,28 @@
-"""What all tiles draw with: models for their instances, sheets of pictures for merged groups."""
+"""What all tiles draw with: models for their instances, sheets of pictures for merged groups.
+
+Tiles refer to both by the names of their files; they need no more of a model than how long its
+vertices are, and of a sheet than where on it pictures are. So files are written once, and whoever
+makes a tile makes none of them.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
 from vegtool.arrays import FloatArray, IntArray
 from vegtool.formats import png
 from vegtool.formats.gltf_tile import SheetFiles
-from vegtool.formats.shared_model import SharedModel, plain_name, shared_model
+from vegtool.formats.shared_model import SharedModel, model_files, plain_name, read_shared
 from vegtool.tiles.pyramid import Pyramid, used_levels
 from vegtool.tiles.sheet import Sheet, sheet_of
 
 FOLDER = "shared"
 """In that of the tiles: readers that keep to a file's own folder find it too."""
-
-
-@dataclass(frozen=True, eq=False)
-class Shared:
-    """models: by species and level. sheets: by the height of the squares that are drawn with them.
-    files: by name, what is to be written."""
-
-    models: dict[tuple[int, int], SharedModel]
-    sheets: dict[int, MergedSheet]
-    files: dict[str, bytes] = field(default_factory=dict)
-
-
-def file_names(names: Sequence[str]) -> list[str]:
-    """Names that no two have, whatever the file system thinks of capitals."""
-    plain = [plain_name(name).lower() for name in names]
-    return [
-        name if plain.count(own) == 1 else f"{name}_{index}"
-        for index, (name, own) in enumerate(zip(names, plain, strict=True))
-    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,34 +40,65 @@ class MergedSheet:
         return np.where(self.part >= 0, count[self.part], 0.0)
 
 
-def shared_of(pyramid: Pyramid, heights: range, folder: str = f"{FOLDER}/") -> Shared:
-    """All that squares of these heights draw with; folder: where it is, as seen from a tile."""
-    near = [height for height in heights if pyramid.instanced(height)]
-    names = file_names([one.name for one in pyramid.species])
-    models = {
-        (kind, level): shared_model(
-            pyramid.species[kind].levels[level], f"{names[kind]}_LOD{level}", folder
-        )
-        for kind, level in used_levels(pyramid, near)
-    }
-    files = {name: data for model in models.values() for name, data in model.files.items()}
-    sheets = {}
-    for height in heights:
-        if pyramid.instanced(height):
-            continue
-        pairs = used_levels(pyramid, [height])
-        sheet = sheet_of(
-            [pyramid.species[kind].levels[level] for kind, level in pairs],
-            pyramid.options.max_texture,
-        )
-        name = f"sheet_{height}"
-        part = np.full(pyramid.of_level.shape, -1, np.int32)
+class Shared:
+    """What the tiles of a pyramid share. folder: that of the tiles' files. Everything is made, or
+    read, when it is asked for first."""
+
+    def __init__(self, pyramid: Pyramid, folder: Path) -> None:
+        self.pyramid, self.folder = pyramid, folder
+        self._models: dict[tuple[int, int], SharedModel] = {}
+        self._sheets: dict[int, MergedSheet] = {}
+
+    @cached_property
+    def _names(self) -> list[str]:
+        return file_names([one.name for one in self.pyramid.species])
+
+    def model_name(self, kind: int, level: int) -> str:
+        """Of a species' level. Not _LOD1: beside a node of that name, readers leave out others."""
+        return f"{self._names[kind]}_{level}"
+
+    def model_files(self, kind: int, level: int) -> dict[str, bytes]:
+        """A level's files, by their names in FOLDER."""
+        plant = self.pyramid.species[kind].levels[level]
+        return model_files(plant, self.model_name(kind, level))
+
+    def model(self, kind: int, level: int) -> SharedModel:
+        """A level whose files are written, as instances refer to it."""
+        if (kind, level) not in self._models:
+            file = self.folder / FOLDER / f"{plain_name(self.model_name(kind, level))}.gltf"
+            self._models[kind, level] = read_shared(file, f"{FOLDER}/")
+        return self._models[kind, level]
+
+    def sheet(self, height: int) -> MergedSheet:
+        """What merged squares of a height are drawn with."""
+        if height not in self._sheets:
+            self._sheets[height] = self._sheet_of(height)
+        return self._sheets[height]
+
+    def sheet_files(self, height: int) -> dict[str, bytes]:
+        """A sheet's files, by their names in FOLDER."""
+        sheet, named = self.sheet(height).sheet, self.sheet(height).files
+        files = {Path(named.color).name: png.encode(sheet.color)}
+        if named.normal is not None and sheet.normal is not None:
+            files[Path(named.normal).name] = png.encode(sheet.normal[..., :3])
+        return files
+
+    def _sheet_of(self, height: int) -> MergedSheet:
+        pairs = used_levels(self.pyramid, height)
+        levels = [self.pyramid.species[kind].levels[level] for kind, level in pairs]
+        sheet = sheet_of(levels, self.pyramid.options.max_texture)
+        part = np.full(self.pyramid.of_level.shape, -1, np.int32)
         part[tuple(np.array(pairs).T)] = np.arange(len(pairs))
-        files[f"{name}_color.png"] = png.encode(sheet.color)
-        normal = None
-        if sheet.normal is not None:
-            normal = f"{folder}{name}_normal.png"
-            files[f"{name}_normal.png"] = png.encode(sheet.normal[..., :3])
-        found = SheetFiles(f"{folder}{name}_color.png", normal, sheet.double_sided, sheet.unlit)
-        sheets[height] = MergedSheet(sheet, found, part)
-    return Shared(models, sheets, files)
+        stem = f"{FOLDER}/sheet_{height}"
+        normal = f"{stem}_normal.png" if sheet.with_normals else None
+        named = SheetFiles(f"{stem}_color.png", normal, sheet.double_sided, sheet.unlit)
+        return MergedSheet(sheet, named, part)
+
+
+def file_names(names: Sequence[str]) -> list[str]:
+    """Names that no two have, whatever the file system thinks of capitals."""
+    plain = [plain_name(name).lower() for name in names]
+    return [
+        name if plain.count(own) == 1 else f"{name}_{index}"
+        for index, (name, own) in enumerate(zip(names, plain, strict=True))
+    ]

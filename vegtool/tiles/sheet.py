@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -41,18 +42,42 @@ Key = tuple[int, int, bytes, bool, float]
 @dataclass(frozen=True, eq=False)
 class Sheet:
     """What a merged group is drawn with. Its colours, of pictures and of parts, are BRIGHTEST times
-    those of the levels.
+    those of the levels. Its pictures are painted when they are asked for.
 
-    color: (h, w, 4) uint8, sRGB, straight alpha, cut off at one half. normal: (h, w, 4) uint8
-    tangent space, or None where no level has one. parts: each level as triangles whose texture
-    coordinates are the sheet's. double_sided, unlit: of the one material.
+    size: (2,) texels across and down. pictured: materials whose pictures it shows. rect: (p + 1, 4)
+    int32 where, x, y, width and height; the last is white. with_normals: whether any level has
+    normal textures. parts: each level as triangles whose texture coordinates are the sheet's.
+    double_sided, unlit: of the one material.
     """
 
-    color: ByteArray
-    normal: ByteArray | None
+    size: IntArray
+    pictured: tuple[Material, ...]
+    rect: IntArray
+    with_normals: bool
     parts: tuple[Triangles, ...]
     double_sided: bool
     unlit: bool = False
+
+    @cached_property
+    def color(self) -> ByteArray:
+        """(h, w, 4) uint8, sRGB, straight alpha, cut off at one half."""
+        color = np.zeros((*self.size[::-1], 4), np.uint8)
+        for rect, material in zip(self.rect, self.pictured, strict=False):
+            _paste(color, rect, _picture(material))
+        _paste(color, self.rect[-1], np.full((WHITE, WHITE, 4), 255, np.uint8))
+        return color
+
+    @cached_property
+    def normal(self) -> ByteArray | None:
+        """(h, w, 4) uint8 tangent space, or None where no level has one."""
+        if not self.with_normals:
+            return None
+        normal = np.full((*self.size[::-1], 4), FLAT, np.uint8)
+        for rect, material in zip(self.rect, self.pictured, strict=False):
+            if material.normal_texture is not None:
+                shape = int(rect[3]), int(rect[2])
+                _paste(normal, rect, _resized(material.normal_texture.pixels, shape))
+        return normal
 
     def material(self, name: str) -> Material:
         """Of everything that is drawn with the sheet."""
@@ -82,31 +107,23 @@ def sheet_of(levels: Sequence[Plant], max_side: int) -> Sheet:
             "which they are to be merged; convert all with --prelit, or none"
         )
     pictured = {_key(m): m for plant in levels for m in _used(plant) if m.color_texture is not None}
-    pictures = [_picture(material) for material in pictured.values()]
-    sizes = [picture.shape[1::-1] for picture in pictures]
+    sizes = [m.color_texture.pixels.shape[1::-1] for m in pictured.values() if m.color_texture]
     packing = pack(np.array([*sizes, (WHITE, WHITE)], np.int32), GUTTER, max_side)
     if max(packing.width, packing.height) > max_side:
         raise UsageError(
             f"--max-texture: expected room for the pictures of {len(levels)} levels, "
             f"{packing.width} x {packing.height} texels; got {max_side}"
         )
-    color = np.zeros((packing.height, packing.width, 4), np.uint8)
     normals = any(m.normal_texture for plant in levels for m in _used(plant))
-    normal = np.full_like(color, FLAT) if normals else None
-    for rect, picture in zip(packing.rect, pictures, strict=False):
-        _paste(color, rect, picture)
-    _paste(color, packing.rect[-1], np.full((WHITE, WHITE, 4), 255, np.uint8))
     place = dict(zip(pictured, packing.rect, strict=False))
-    for key, material in pictured.items():
-        if normal is not None and material.normal_texture is not None:
-            _, _, width, height = place[key]
-            _paste(normal, place[key], _resized(material.normal_texture.pixels, (height, width)))
     double_sided = all(m.double_sided for plant in levels for m in _used(plant))
-    size = np.array([packing.width, packing.height], np.float64)
+    size = np.array([packing.width, packing.height], np.int32)
     parts = tuple(
         _part(plant, place, packing.rect[-1], size, double_sided, normals) for plant in levels
     )
-    return Sheet(color, normal, parts, double_sided, unlit == {True})
+    return Sheet(
+        size, tuple(pictured.values()), packing.rect, normals, parts, double_sided, unlit == {True}
+    )
 
 
 def _used(plant: Plant) -> list[Material]:
@@ -162,7 +179,7 @@ def _part(
     plant: Plant,
     place: dict[Key, IntArray],
     white: IntArray,
-    size: FloatArray,
+    size: IntArray,
     double_sided: bool,
     with_tangents: bool,
 ) -> Triangles:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -15,7 +15,8 @@ from vegtool.tiles.placement import LongArray, Placement
 @dataclass(frozen=True, eq=False)
 class Stand:
     """n plants. foot: (n, 3) float64 metres in the scene's frame. species: (n,) int32. scale: (n,)
-    of the model. yaw: (n,) radians about +y. tint: (n, 3) linear factors. row: (n,) which plant."""
+    of the model. yaw: (n,) radians about +y. tint: (n, 3) linear factors. row: (n,) which plant.
+    tile: (n,) int64 the placement's tile that each is on."""
 
     foot: FloatArray
     species: IntArray
@@ -23,9 +24,15 @@ class Stand:
     yaw: FloatArray
     tint: SingleArray
     row: LongArray
+    tile: LongArray
 
     def __len__(self) -> int:
         return len(self.foot)
+
+    def on(self, tiles: LongArray) -> Stand:
+        """The plants on some of the tiles alone, in their order."""
+        kept = np.isin(self.tile, tiles)
+        return Stand(*(getattr(self, item.name)[kept] for item in fields(self)))
 
 
 def stand_on(placement: Placement, tiles: LongArray, species: Sequence[Species]) -> Stand:
@@ -41,4 +48,5 @@ def stand_on(placement: Placement, tiles: LongArray, species: Sequence[Species])
         np.concatenate([plants.yaw for plants in found]).astype(np.float64),
         np.concatenate([plants.tint for plants in found]),
         np.concatenate([plants.row for plants in found]),
+        np.repeat(tiles, [len(plants) for plants in found]),
     )

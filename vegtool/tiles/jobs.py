@@ -1,0 +1,355 @@
+"""The work that a tileset is made of, in parts that any process can do which sees the same files.
+
+A model or a sheet that tiles share; a block, which is a merged square with all squares on it, whose
+plants are placed once; and a far square, which is made of its quarters. A part whose key the
+journal has, with its files there, is not made again.
+"""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from vegtool.errors import (
+    CapabilityError,
+    InputError,
+    OutputError,
+    UsageError,
+    VegtoolError,
+    unknown,
+)
+from vegtool.formats import read_plant
+from vegtool.progress import Progress, silent
+from vegtool.tiles.journal import Entry, key_of, write_file
+from vegtool.tiles.make import (
+    Chosen,
+    Tile,
+    chosen,
+    instanced_tile,
+    merged_tile,
+    reclustered_tile,
+)
+from vegtool.tiles.options import TileOptions
+from vegtool.tiles.pyramid import Pyramid, pyramid_of, used_levels
+from vegtool.tiles.quadtree import Node, Quadtree
+from vegtool.tiles.shared import FOLDER, Shared
+from vegtool.tiles.source import scene_at
+from vegtool.tiles.stand import Stand
+from vegtool.timing import timed
+from vegtool.workers import check_stop
+
+TILES = "tiles"
+"""Folder of the tiles, in that of the tileset."""
+
+
+FATAL = (OutputError, UsageError, CapabilityError)
+"""Errors that other parts would meet with, too: they end the run, which can go on later."""
+
+
+def file_of(node: Node) -> str:
+    """Of a tile, relative to the output folder."""
+    return f"{TILES}/{node.level}_{node.column}_{node.row}.glb"
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """What tiles are made of, and where they go, by path."""
+
+    scene: Path
+    library: Path
+    out: Path
+    options: TileOptions
+
+
+@dataclass(frozen=True, eq=False)
+class World:
+    """The same, read."""
+
+    pyramid: Pyramid
+    shared: Shared
+    out: Path
+
+
+@dataclass(frozen=True)
+class Job:
+    """A part to make. known: what the journal has of what it makes."""
+
+    known: dict[str, Entry] = field(default_factory=dict, compare=False)
+
+    def entry(self, name: str, key: str, out: Path) -> Entry | None:
+        """What is made already."""
+        entry = self.known.get(name)
+        return entry if entry and entry.key == key and entry.there(out) else None
+
+
+@dataclass(frozen=True)
+class ModelJob(Job):
+    """A level of a species, for instances."""
+
+    kind: int = 0
+    level: int = 0
+
+
+@dataclass(frozen=True)
+class SheetJob(Job):
+    """The sheet of a height."""
+
+    height: int = 0
+
+
+@dataclass(frozen=True)
+class BlockJob(Job):
+    """A square, and all on it."""
+
+    node: Node = field(default=Node(0, 0, 0))
+
+
+@dataclass(frozen=True)
+class TileJob(Job):
+    """A square of a block alone, with the models that it draws."""
+
+    node: Node = field(default=Node(0, 0, 0))
+
+
+@dataclass(frozen=True)
+class FarJob(Job):
+    """A square above the blocks. quarters: as they were made; None where that failed."""
+
+    node: Node = field(default=Node(0, 0, 0))
+    quarters: tuple[tuple[Node, Entry | None], ...] = ()
+
+
+@dataclass(frozen=True)
+class Made:
+    """A part that is there. again: whether it was made now. seconds: by step, if so."""
+
+    entry: Entry
+    again: bool = True
+    seconds: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Failed:
+    """A part that is not. trace: where an error that vegtool does not know came from."""
+
+    name: str
+    message: str
+    exit_code: int = 1
+    trace: str = ""
+
+
+Outcome = Made | Failed
+
+
+def world_of(inputs: Inputs, progress: Progress = silent) -> World:
+    """All that jobs need.
+
+    Raises UsageError and InputError for what is missing or broken.
+    """
+    scene = scene_at(inputs.scene, inputs.library)
+    pyramid = pyramid_of(scene, inputs.library, inputs.options, progress)
+    return World(pyramid, Shared(pyramid, inputs.out / TILES), inputs.out)
+
+
+_world = lru_cache(maxsize=1)(world_of)
+
+
+def do_at(inputs: Inputs, job: Job) -> list[Outcome]:
+    """`do`, by another process, which reads the inputs once."""
+    return do(_world(inputs), job)
+
+
+def do(world: World, job: Job) -> list[Outcome]:
+    """Make a part; of a block, all of its tiles. An error becomes part of the outcome, unless it is
+    one of FATAL, which are raised."""
+    done: list[Outcome] = []
+    try:
+        for outcome in _DO[type(job)](world, job):
+            done.append(outcome)
+    except FATAL:
+        raise
+    except Exception as error:
+        done.append(_failed(name_of(job), error))
+    return done
+
+
+def name_of(job: Job) -> str:
+    """What the journal calls it."""
+    if isinstance(job, ModelJob):
+        return f"model {job.kind}/{job.level}"
+    if isinstance(job, SheetJob):
+        return f"sheet {job.height}"
+    assert isinstance(job, BlockJob | TileJob | FarJob)
+    return str(job.node)
+
+
+def nodes_of(tree: Quadtree, node: Node) -> list[Node]:
+    """A square and all on it, the smallest first."""
+    levels = [[node]]
+    while levels[-1][0].level < tree.depth:
+        levels.append([one for above in levels[-1] for one in tree.quarters(above)])
+    return [one for level in reversed(levels) for one in level]
+
+
+def _failed(name: str, error: Exception) -> Failed:
+    if isinstance(error, VegtoolError):
+        return Failed(name, f"tile {name}: {error}", error.exit_code)
+    if isinstance(error, MemoryError):
+        return Failed(name, f"tile {name}: not enough memory; fewer processes (-j) need less")
+    return Failed(name, f"tile {name}: {unknown(error)}", trace=traceback.format_exc())
+
+
+def _model(world: World, job: ModelJob) -> Iterator[Outcome]:
+    name, shared = name_of(job), world.shared
+    key = key_of(shared.model_name(job.kind, job.level), world.pyramid.digest(job.kind, job.level))
+    yield _shared(world, job, name, key, lambda: shared.model_files(job.kind, job.level))
+
+
+def _sheet(world: World, job: SheetJob) -> Iterator[Outcome]:
+    key = _sheet_key(world, job.height)
+    yield _shared(world, job, name_of(job), key, lambda: world.shared.sheet_files(job.height))
+
+
+def _shared(world: World, job: Job, name: str, key: str, make: Any) -> Outcome:
+    """What tiles share, made unless it is there."""
+    there = job.entry(name, key, world.out)
+    if there is not None:
+        return Made(there, again=False)
+    seconds: dict[str, float] = {}
+    with timed(seconds, "shared"):
+        files = {f"{TILES}/{FOLDER}/{file}": data for file, data in make().items()}
+        for file, data in files.items():
+            write_file(world.out / file, data)
+    return Made(Entry(name, key, {file: len(data) for file, data in files.items()}), True, seconds)
+
+
+def _block(world: World, job: BlockJob) -> Iterator[Outcome]:
+    tree, seconds = world.pyramid.tree, dict[str, float]()
+    with timed(seconds, "placement"):
+        stand = world.pyramid.stand(job.node)
+    squares = nodes_of(tree, job.node)
+    for node in squares:
+        check_stop()
+        try:
+            own = stand if node == job.node else stand.on(tree.tiles_of(node))
+            made = _placed(world, job, node, own)
+        except FATAL:
+            raise
+        except Exception as error:
+            yield _failed(str(node), error)
+            continue
+        if node == squares[0]:
+            made = replace(made, seconds={**seconds, **made.seconds})
+        yield made
+
+
+def _placed(world: World, job: Job, node: Node, stand: Stand) -> Made:
+    """A tile of the plants that stand on it."""
+    pyramid, name = world.pyramid, str(node)
+    if not len(stand):
+        return Made(Entry(name, key_of("none"), {}, {"plants": 0}), again=False)
+    near = pyramid.instanced(pyramid.tree.height(node.level))
+    how = chosen(pyramid, world.shared, node, stand)
+    key = _stand_key(world, node, stand, how)
+    there = job.entry(name, key, world.out)
+    if there is not None:
+        return Made(there, again=False)
+    make = instanced_tile if near else merged_tile
+    return _written(world, make(pyramid, world.shared, node, stand, how.level), key)
+
+
+def _tile(world: World, job: TileJob) -> Iterator[Outcome]:
+    pyramid, seconds = world.pyramid, dict[str, float]()
+    with timed(seconds, "placement"):
+        stand = pyramid.stand(job.node)
+    if len(stand) and pyramid.instanced(pyramid.tree.height(job.node.level)):
+        how = chosen(pyramid, world.shared, job.node, stand)
+        for kind, level in _drawn(stand, how):
+            yield from _model(world, ModelJob(job.known, kind, level))
+    made = _placed(world, job, job.node, stand)
+    yield replace(made, seconds={**seconds, **made.seconds})
+
+
+def _far(world: World, job: FarJob) -> Iterator[Outcome]:
+    check_stop()
+    pyramid, node, seconds = world.pyramid, job.node, dict[str, float]()
+    lost = [str(one) for one, entry in job.quarters if entry is None]
+    if lost:
+        raise InputError(f"is made of its quarters, of which {', '.join(lost)} failed")
+    quarters = [(one, entry) for one, entry in job.quarters if entry and entry.facts["plants"]]
+    if all(entry.facts["kind"] != "reclustered" for _, entry in quarters):
+        with timed(seconds, "placement"):
+            stand = pyramid.stand(node)
+        if not len(stand) or not chosen(pyramid, world.shared, node, stand).too_coarse:
+            yield _placed(world, job, node, stand)
+            return
+    key = key_of(
+        "reclustered", pyramid.budget(node), pyramid.from_m(pyramid.tree.height(node.level)),
+        pyramid.options.max_texture, repr(pyramid.display),
+        *(entry.key for _, entry in quarters),
+        *(pyramid.origin(one) - pyramid.origin(node) for one, _ in quarters),
+    )  # fmt: skip
+    there = job.entry(str(node), key, world.out)
+    if there is not None:
+        yield Made(there, again=False)
+        return
+    with timed(seconds, "quarters"):
+        read = [(one, read_plant(world.out / file_of(one))) for one, _ in quarters]
+    tile = reclustered_tile(pyramid, node, read, sum(e.facts["plants"] for _, e in quarters))
+    yield _written(world, replace(tile, seconds={**seconds, **tile.seconds}), key)
+
+
+_DO: dict[type[Job], Any] = {
+    ModelJob: _model,
+    SheetJob: _sheet,
+    BlockJob: _block,
+    TileJob: _tile,
+    FarJob: _far,
+}
+
+
+def _written(world: World, tile: Tile, key: str) -> Made:
+    file, origin = file_of(tile.node), world.pyramid.origin(tile.node)
+    write_file(world.out / file, tile.data)
+    facts = {
+        "kind": tile.kind,
+        "plants": tile.plants,
+        "triangles": tile.triangles,
+        "draws": tile.draws,
+        "error_m": tile.error_m,
+        "bounds": None if tile.bounds is None else (tile.bounds - origin).tolist(),
+    }
+    return Made(Entry(str(tile.node), key, {file: len(tile.data)}, facts), True, tile.seconds)
+
+
+def _stand_key(world: World, node: Node, stand: Stand, how: Chosen) -> str:
+    """Of the plants on a square, and of what they are drawn as."""
+    pyramid, height = world.pyramid, world.pyramid.tree.height(node.level)
+    near = pyramid.instanced(height)
+    drawn: Sequence[str] = (
+        [
+            f"{world.shared.model_name(kind, level)} {pyramid.digest(kind, level)}"
+            for kind, level in _drawn(stand, how)
+        ]
+        if near
+        else [_sheet_key(world, height), repr(pyramid.options.plain)]
+    )
+    return key_of(
+        *drawn, stand.foot - pyramid.origin(node), stand.species, stand.scale, stand.yaw,
+        stand.tint, how.level,
+    )  # fmt: skip
+
+
+def _drawn(stand: Stand, how: Chosen) -> list[tuple[int, int]]:
+    """Species and levels that are drawn, in order."""
+    return sorted(set(zip(stand.species.tolist(), how.level.tolist(), strict=True)))
+
+
+def _sheet_key(world: World, height: int) -> str:
+    levels = used_levels(world.pyramid, height)
+    digests = [world.pyramid.digest(kind, level) for kind, level in levels]
+    return key_of(height, world.pyramid.options.max_texture, repr(levels), *digests)

@@ -1,0 +1,175 @@
+"""Work done side by side: in this process, or in several on this machine."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, as_completed
+from contextlib import contextmanager
+from multiprocessing import get_context
+from types import TracebackType
+from typing import TYPE_CHECKING, Protocol, Self, TypeVar
+
+if TYPE_CHECKING:
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing.synchronize import Event
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+TRIES = 3
+"""Times that an item is begun whose process ends under it, before it counts as what ends it."""
+
+
+class Crew(Protocol):
+    """Those who do the work."""
+
+    def each(
+        self, function: Callable[[Item], Result], items: Sequence[Item]
+    ) -> Iterator[tuple[Item, Result | None]]:
+        """Each item with its result, in the order in which they are done; None where whoever
+        worked on it was ended from outside, again and again."""
+
+
+class Alone:
+    """A Crew of this process."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """Nothing is left to end."""
+
+    def each(
+        self, function: Callable[[Item], Result], items: Sequence[Item]
+    ) -> Iterator[tuple[Item, Result | None]]:
+        for item in items:
+            yield item, function(item)
+
+
+class Processes:
+    """A Crew of processes on this machine, until the `with` block ends; an exception in it, Ctrl-C
+    included, ends them at their next `check_stop`."""
+
+    def __init__(self, count: int) -> None:
+        self._count = count
+        # spawn: a GL context does not survive a fork
+        self._spawn = get_context("spawn")
+        self._stop = self._spawn.Event()
+        self._pool: ProcessPoolExecutor | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if error is not None:
+            self._stop.set()
+        self._end()
+
+    def submit(
+        self, function: Callable[..., Result], jobs: Sequence[tuple[object, ...]]
+    ) -> list[Future[Result]]:
+        """A future of the function called with the arguments of each job."""
+        from concurrent.futures import ProcessPoolExecutor
+
+        with _uninterrupted():
+            if self._pool is None:
+                self._pool = ProcessPoolExecutor(
+                    self._count, self._spawn, _in_worker, (self._stop,)
+                )
+            return [self._pool.submit(function, *job) for job in jobs]
+
+    def each(
+        self, function: Callable[[Item], Result], items: Sequence[Item]
+    ) -> Iterator[tuple[Item, Result | None]]:
+        from concurrent.futures.process import BrokenProcessPool
+
+        futures = self.submit(function, [(item,) for item in items])
+        of = dict(zip(futures, items, strict=True))
+        lost = []
+        for future in as_completed(futures):
+            try:
+                result = future.result()
+            except BrokenProcessPool:
+                lost.append(of[future])
+            else:
+                yield of[future], result
+        # whichever of them ends its process is to end no other's: again, one at a time
+        for item in sorted(lost, key=list(items).index):
+            yield item, self._again(function, item)
+
+    def _again(self, function: Callable[[Item], Result], item: Item) -> Result | None:
+        """The result of an item that was lost; None where it is lost again and again."""
+        from concurrent.futures.process import BrokenProcessPool
+
+        for _ in range(TRIES - 1):
+            self._end()  # one that has lost a process takes no more work
+            try:
+                (future,) = self.submit(function, [(item,)])
+                return future.result()
+            except BrokenProcessPool:
+                continue
+        return None
+
+    def _end(self) -> None:
+        if self._pool is not None:
+            self._pool.shutdown(cancel_futures=True)
+            self._pool = None
+
+
+_stop: Event | None = None
+"""In a worker: set once all work is to end."""
+
+
+def check_stop() -> None:
+    """In a worker: the chance to end, and to leave nothing half-written. Raises KeyboardInterrupt
+    where all is to end."""
+    if _stop is not None and _stop.is_set():
+        raise KeyboardInterrupt
+
+
+def _in_worker(stop: Event) -> None:
+    """What a worker does first: leave Ctrl-C to the process that started it, and end with it."""
+    global _stop
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _stop = stop
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """Not to wait without end for work from a process that was killed."""
+    from multiprocessing import parent_process
+
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
+@contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Processes are started whole: one half-started would be waited for without end.
+
+    They begin deaf to Ctrl-C, which a terminal sends to all of them; other signals wait.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came: list[int] = []
+    others = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    before = {number: signal.signal(number, lambda n, frame: came.append(n)) for number in others}
+    before[signal.SIGINT] = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler or signal.SIG_DFL)
+    for number in came:
+        signal.raise_signal(number)
