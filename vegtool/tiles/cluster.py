@@ -48,7 +48,7 @@ class Cluster:
         try:
             self._client.wait_for_workers(1, timeout=TIMEOUT_S)
         except TimeoutError as error:
-            self._client.close()
+            self._close()
             raise UsageError(
                 f"--dask {address}: expected workers, found none; start some with: dask worker "
                 f"{address}"
@@ -58,22 +58,28 @@ class Cluster:
         return self
 
     def __exit__(self, *error: object) -> None:
-        self._client.close()
+        self._close()
+
+    def _close(self) -> None:
+        close: Any = self._client.close  # untyped
+        close()
 
     def each(
         self, function: Callable[[Item], Result], items: Sequence[Item]
     ) -> Iterator[tuple[Item, Result | None]]:
-        from distributed import KilledWorker, as_completed
+        import distributed
+
+        as_completed: Any = distributed.as_completed  # untyped
 
         futures = [
             self._client.submit(_alone, function, item, pure=False, retries=RETRIES)
             for item in items
         ]
         of = {future.key: item for future, item in zip(futures, items, strict=True)}
-        for future in as_completed(futures):
+        for future in as_completed(futures, loop=self._client.loop):
             try:
                 result = future.result()
-            except KilledWorker:
+            except distributed.KilledWorker:
                 yield of[future.key], None
             else:
                 yield of[future.key], result

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -50,6 +50,7 @@ def run_tiles(
     _check_out(inputs, run.force)
     with bar("reading") as progress:
         world = world_of(inputs, progress)
+    inputs = replace(inputs, digest=world.digest)
     for note in world.pyramid.notes:
         say(note)
     with bar("tiles") as progress:

@@ -24,6 +24,7 @@ from vegtool.errors import (
 )
 from vegtool.formats import read_plant
 from vegtool.progress import Progress, silent
+from vegtool.scene import Scene
 from vegtool.tiles.journal import Entry, key_of, write_file
 from vegtool.tiles.make import (
     Chosen,
@@ -57,21 +58,24 @@ def file_of(node: Node) -> str:
 
 @dataclass(frozen=True)
 class Inputs:
-    """What tiles are made of, and where they go, by path."""
+    """What tiles are made of, and where they go, by path. digest: of what is there, or None where
+    that is not known yet."""
 
     scene: Path
     library: Path
     out: Path
     options: TileOptions
+    digest: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class World:
-    """The same, read."""
+    """The same, read. digest: of all files that were."""
 
     pyramid: Pyramid
     shared: Shared
     out: Path
+    digest: str = ""
 
 
 @dataclass(frozen=True)
@@ -148,11 +152,18 @@ Outcome = Made | Failed
 def world_of(inputs: Inputs, progress: Progress = silent) -> World:
     """All that jobs need.
 
-    Raises UsageError and InputError for what is missing or broken.
+    Raises UsageError and InputError for what is missing or broken, InputError for what is not as
+    the digest says.
     """
     scene = scene_at(inputs.scene, inputs.library)
     pyramid = pyramid_of(scene, inputs.library, inputs.options, progress)
-    return World(pyramid, Shared(pyramid, inputs.out / TILES), inputs.out)
+    digest = _digest(scene, pyramid)
+    if inputs.digest not in (None, digest):
+        raise InputError(
+            f"{inputs.scene}, {inputs.library}: are not the same, here, as where the run was "
+            "started; all who work on it are to see the same files"
+        )
+    return World(pyramid, Shared(pyramid, inputs.out / TILES), inputs.out, digest)
 
 
 _world = lru_cache(maxsize=1)(world_of)
@@ -161,6 +172,19 @@ _world = lru_cache(maxsize=1)(world_of)
 def do_at(inputs: Inputs, job: Job) -> list[Outcome]:
     """`do`, by another process, which reads the inputs once."""
     return do(_world(inputs), job)
+
+
+def _digest(scene: Scene, pyramid: Pyramid) -> str:
+    """Of the scene's own files, and of the species that it names."""
+    named = [scene.placement.inventory, scene.terrain.heightmap]
+    named += [table.density for table in scene.species]
+    files = [scene.path, *(scene.path.parent / name for name in named if name is not None)]
+    levels = [
+        pyramid.digest(kind, level)
+        for kind, one in enumerate(pyramid.species)
+        for level in range(len(one.levels))
+    ]
+    return key_of(*(file.read_bytes() for file in files), *levels)
 
 
 def do(world: World, job: Job) -> list[Outcome]:
