@@ -32,7 +32,9 @@ MAY_IMPORT: dict[str, set[str]] = {
     "measure": {"gl", "lighting"},
     "baselines": {"formats", "baking", "gl", "measure"},
     "refine": {"branches", "clustering", "boxes", "gl", "baking", "lighting", "measure"},
-    "tiles": {"scene", "formats", "baking", "gl", "measure", "refine", "tangents"},
+    "tiles": {
+        "batch", "convert", "scene", "formats", "baking", "gl", "measure", "refine", "tangents",
+    },
     "convert": {"clustering", "boxes", "gl", "baking", "lighting", "measure", "refine"},
     "batch": {"convert", "formats", "measure"},
     "scene": {"convert", "lighting"},

@@ -13,10 +13,11 @@ import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from vegtool.convert import ConvertOptions, convert
 from vegtool.errors import InputError, UsageError, VegtoolError, unknown
@@ -27,6 +28,9 @@ from vegtool.progress import Progress, silent
 
 if TYPE_CHECKING:
     from multiprocessing.synchronize import Event
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
@@ -85,7 +89,7 @@ def find_jobs(inputs: Sequence[Path]) -> list[Job]:
     sources: list[Path] = []
     for path in inputs:
         if _is_folder(path):
-            models = _models_in(path)
+            models = models_in(path)
             if not models:
                 known = " ".join(READERS)
                 raise InputError(f"{path}: expected models ({known}) in this folder, found none")
@@ -103,7 +107,7 @@ def find_jobs(inputs: Sequence[Path]) -> list[Job]:
         (
             job
             for job, name in zip(jobs, names, strict=True)
-            if names.count(name) > 1 or _plant_of_level(name) in names
+            if names.count(name) > 1 or plant_of_level(name) in names
         ),
         None,
     )
@@ -162,9 +166,29 @@ def convert_files(
     progress: Callable[[Job], Progress] = lambda job: silent,
 ) -> Iterator[Outcome]:
     """Convert a batch in the order given; an error becomes part of that file's outcome."""
-    if workers <= 1 or len(jobs) == 1:
-        for job in jobs:
-            yield _outcome(job, task, progress(job))
+
+    def died(job: Job) -> Outcome:
+        return Outcome(job, error=f"{job.source}: {WORKER_DIED}", exit_code=1)
+
+    yield from side_by_side(partial(_outcome, task), jobs, died, workers, progress)
+
+
+def side_by_side(
+    function: Callable[[Item, Progress], Result],
+    items: Sequence[Item],
+    died: Callable[[Item], Result],
+    workers: int,
+    progress: Callable[[Item], Progress] = lambda item: silent,
+) -> Iterator[Result]:
+    """What a function makes of items, in the order given, in so many processes, or in this one.
+
+    function, items, results: what `pickle` takes. died: the result, where the process was ended
+    from outside. progress: of an item; in other processes it is told when that is done, and how
+    many of all are. Raises what the function raises; what has not begun then does not begin.
+    """
+    if workers <= 1 or len(items) <= 1:
+        for item in items:
+            yield function(item, progress(item))
         return
     from concurrent.futures import ProcessPoolExecutor
     from concurrent.futures.process import BrokenProcessPool
@@ -173,16 +197,16 @@ def convert_files(
     # spawn: a GL context does not survive a fork
     spawn = get_context("spawn")
     stop = spawn.Event()
-    with ProcessPoolExecutor(min(workers, len(jobs)), spawn, _in_worker, (stop,)) as pool:
+    with ProcessPoolExecutor(min(workers, len(items)), spawn, _in_worker, (stop,)) as pool:
         try:
             with _uninterrupted():
-                futures = [pool.submit(_outcome, job, task, _or_stop) for job in jobs]
-            for done, (job, future) in enumerate(zip(jobs, futures, strict=True), start=1):
+                futures = [pool.submit(function, item, _or_stop) for item in items]
+            for done, (item, future) in enumerate(zip(items, futures, strict=True), start=1):
                 try:
                     yield future.result()
                 except BrokenProcessPool:
-                    yield Outcome(job, error=f"{job.source}: {_WORKER_DIED}", exit_code=1)
-                progress(job)("done", done / len(jobs))
+                    yield died(item)
+                progress(item)("done", done / len(items))
         except BaseException:
             stop.set()
             pool.shutdown(cancel_futures=True)
@@ -193,7 +217,7 @@ _NOTHING_TO_PACK = (
     "--packed: no level has light beside its colours to write; --occlusion and --translucency give"
     " it some, --prelit takes it"
 )
-_WORKER_DIED = (
+WORKER_DIED = (
     "the process that converted it, or one beside it, was ended from outside, mostly for want of"
     " memory; fewer files at a time (-j) need less"
 )
@@ -247,7 +271,7 @@ def _uninterrupted() -> Iterator[None]:
         signal.raise_signal(number)
 
 
-def _plant_of_level(name: str) -> str | None:
+def plant_of_level(name: str) -> str | None:
     """oak, where the name is that of a level of an oak, oak_LOD1, or of its shadow, oak_shadow."""
     found = re.fullmatch(r"(.+)_(?:lod\d+|shadow)", name, re.IGNORECASE | re.DOTALL)
     return found[1] if found else None
@@ -260,7 +284,7 @@ def _is_folder(path: Path) -> bool:
         return False
 
 
-def _models_in(folder: Path) -> list[Path]:
+def models_in(folder: Path) -> list[Path]:
     """The models in a folder, less the levels that an earlier run left there."""
     try:
         return sorted(
@@ -268,13 +292,13 @@ def _models_in(folder: Path) -> list[Path]:
             for p in folder.iterdir()
             if p.suffix.lower() in READERS
             and not p.is_dir()
-            and not (folder / f"{_plant_of_level(p.stem)}.lod.json").exists()
+            and not (folder / f"{plant_of_level(p.stem)}.lod.json").exists()
         )
     except OSError as error:
         raise InputError(f"{folder}: cannot be read ({error.strerror}); allow it") from error
 
 
-def _outcome(job: Job, task: Task, progress: Progress = silent) -> Outcome:
+def _outcome(task: Task, job: Job, progress: Progress) -> Outcome:
     try:
         return convert_file(job, task, progress)
     except VegtoolError as error:

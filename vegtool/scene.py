@@ -144,6 +144,10 @@ KINDS: dict[str, tuple[str, Callable[[Any], bool]]] = {
         "three points at least that are not on one line, [[x, z], [x, z], [x, z]]",
         lambda v: isinstance(v, list) and all(map(_is_pair, v)) and _has_area(v),
     ),
+    "names": (
+        'names in quotes, ["a", "b"]',
+        lambda v: isinstance(v, list) and all(isinstance(w, str) and w.strip() for w in v),
+    ),
     "words": (
         'names in quotes, { x = "easting" }',
         lambda v: isinstance(v, dict) and all(isinstance(word, str) for word in v.values()),
@@ -188,7 +192,8 @@ class TerrainTable:
 
 @dataclass(frozen=True)
 class SpeciesTable:
-    """One kind of plant, and where it grows; None where the file does not say."""
+    """One kind of plant, and where it grows; None where the file does not say. aliases: other names
+    that an inventory may call it."""
 
     name: str | None = None
     model: str | None = None
@@ -197,6 +202,7 @@ class SpeciesTable:
     slope_deg: Pair | None = None
     elevation_m: Pair | None = None
     density: str | None = None
+    aliases: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
