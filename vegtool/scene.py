@@ -73,6 +73,7 @@ SCHEMA: dict[str, dict[str, Key]] = {
         "slope_deg": Key("range", "slopes that it grows on", least=0, most=90),
         "elevation_m": Key("range", "heights of the ground that it grows at"),
         "density": Key("text", "file of a map that says where it grows"),
+        "aliases": Key("names", "other names that an inventory calls it"),
     },
     "placement": {
         "seed": _like("seed", "integer", "seed of every random choice"),
@@ -192,8 +193,7 @@ class TerrainTable:
 
 @dataclass(frozen=True)
 class SpeciesTable:
-    """One kind of plant, and where it grows; None where the file does not say. aliases: other names
-    that an inventory may call it."""
+    """One kind of plant, and where it grows; None where the file does not say."""
 
     name: str | None = None
     model: str | None = None
