@@ -79,16 +79,21 @@ def filling(place: Path, source: Path, by_hand: str) -> Iterator[Path]:
         ) from error
     try:
         yield part
-        if kept(place) is None:
-            shutil.rmtree(place, ignore_errors=True)  # what somebody has taken files from
-            try:
-                with explained(place):
-                    part.replace(place)
-            except OutputError:
-                if kept(place) is None:  # nor did another process put it there
-                    raise
+        _move_in(part, place)
     finally:
         shutil.rmtree(part, ignore_errors=True)
+
+
+def _move_in(part: Path, place: Path) -> None:
+    if kept(place) is not None:
+        return
+    shutil.rmtree(place, ignore_errors=True)  # what somebody has taken files from
+    try:
+        with explained(place):
+            part.replace(place)
+    except OutputError:
+        if kept(place) is None:  # nor did another process put it there meanwhile
+            raise
 
 
 def clean(library: Path) -> None:

@@ -137,10 +137,10 @@ def _converted(work: Work, progress: Progress) -> LodChain:
 def _following(source: Source, library: Path) -> Work | None:
     """How a converted plant gets coarser levels, where it lacks them."""
     base, told = stored_species(source.path), read_manifest(source.path)
-    last, options = told["levels"][-1], _options(source.path, told)
+    last = told["levels"][-1]
     if last["triangles"] <= FEW:
         return None
-    read, how, measure = options
+    read, how, measure = _options(source.path, told)
     if len(base.levels) == 1:
         how = replace(how, levels=LEVELS)
     else:

@@ -166,10 +166,10 @@ class _Kinds:
                 raise UsageError(
                     f"{at}: expected a name, by which {table.path} can call it; got none"
                 )
-            for name in (kind.name, *kind.aliases):
-                if _plain(name) in self.known:
+            for plain, name in {_plain(name): name for name in (kind.name, *kind.aliases)}.items():
+                if plain in self.known:
                     raise UsageError(f"{at}: name: two species are called {name}; rename one")
-                self.known[_plain(name)] = index
+                self.known[plain] = index
             self.names.append(kind.name)
         self.remedy = "correct it, or add a [[species]] of that name to the scene"
         if scene.path == table.path:
