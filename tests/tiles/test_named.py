@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from pathlib import Path
 
@@ -11,8 +12,9 @@ from tile_cases import scene_of
 
 from vegtool.errors import InputError, UsageError, VegtoolError
 from vegtool.formats import ReadOptions
+from vegtool.scene import KINDS
 from vegtool.tiles.library import MANIFEST
-from vegtool.tiles.named import TABLES, Library, Source, library_at
+from vegtool.tiles.named import KEYS, TABLES, Library, Source, library_at
 from vegtool.tiles.source import scene_at
 from vegtool.tiles.species import source_of, species_of
 
@@ -216,3 +218,9 @@ def test_models_are_shown_as_the_library_says_they_are_read(tmp_path: Path) -> N
     centimetres = species_of(scene, tmp_path, ReadOptions())
     assert centimetres.species[0].size == pytest.approx(metres.species[0].size / 100)
     assert not (tmp_path / ".vegtool").exists()
+
+
+def test_the_page_describes_every_key_as_it_is() -> None:
+    page = Path(__file__).parents[2] / "docs" / "species.md"
+    rows = re.findall(r"^\| `(\w+)` \| (.+?) \|", page.read_text(encoding="utf-8"), re.MULTILINE)
+    assert rows == [(key, KINDS[rule.kind][0]) for key, rule in KEYS.items()]
