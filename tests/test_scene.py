@@ -67,6 +67,7 @@ height_m = [4, 18]
 slope_deg = [0, 30]
 elevation_m = [0, 600]
 density = "ash.png"
+aliases = ["Esche", "Fraxinus excelsior"]
 
 [[species]]
 name = "pine"
@@ -110,7 +111,8 @@ def test_a_whole_scene_is_read(tmp_path: Path) -> None:
     assert scene.terrain == TerrainTable(
         "heightmap", "valley.tif", (2000, 1500), "EPSG:25832", (565_000, 5_930_000), (-3, 710)
     )
-    ash = SpeciesTable("ash", "ash.glb", 0.5, (4, 18), (0, 30), (0, 600), "ash.png")
+    names = ("Esche", "Fraxinus excelsior")
+    ash = SpeciesTable("ash", "ash.glb", 0.5, (4, 18), (0, 30), (0, 600), "ash.png", names)
     assert scene.species == (ash, SpeciesTable("pine", "pine.glb"))
     columns, units = {"x": "easting", "y": "northing"}, {"height": "cm"}
     assert scene.placement == PlacementTable(4, 3, "trees.csv", columns, units)

@@ -10,6 +10,7 @@ import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
@@ -79,7 +80,7 @@ def find_jobs(inputs: Sequence[Path]) -> list[Job]:
     sources: list[Path] = []
     for path in inputs:
         if _is_folder(path):
-            models = _models_in(path)
+            models = models_in(path)
             if not models:
                 known = " ".join(READERS)
                 raise InputError(f"{path}: expected models ({known}) in this folder, found none")
@@ -97,7 +98,7 @@ def find_jobs(inputs: Sequence[Path]) -> list[Job]:
         (
             job
             for job, name in zip(jobs, names, strict=True)
-            if names.count(name) > 1 or _plant_of_level(name) in names
+            if names.count(name) > 1 or plant_of_level(name) in names
         ),
         None,
     )
@@ -156,42 +157,22 @@ def convert_files(
     progress: Callable[[Job], Progress] = lambda job: silent,
 ) -> Iterator[Outcome]:
     """Convert a batch in the order given; an error becomes part of that file's outcome."""
-    if workers <= 1 or len(jobs) == 1:
-        for job in jobs:
-            yield _outcome(job, task, progress(job))
-        return
-    from concurrent.futures.process import BrokenProcessPool
 
-    from vegtool.workers import Processes
+    from vegtool.workers import WORKER_DIED, side_by_side
 
-    with Processes(min(workers, len(jobs))) as crew:
-        futures = crew.submit(_outcome, [(job, task, _or_stop) for job in jobs])
-        for done, (job, future) in enumerate(zip(jobs, futures, strict=True), start=1):
-            try:
-                yield future.result()
-            except BrokenProcessPool:
-                yield Outcome(job, error=f"{job.source}: {_WORKER_DIED}", exit_code=1)
-            progress(job)("done", done / len(jobs))
+    def died(job: Job) -> Outcome:
+        return Outcome(job, error=f"{job.source}: {WORKER_DIED}", exit_code=1)
+
+    yield from side_by_side(partial(_outcome, task), jobs, died, workers, progress)
 
 
 _NOTHING_TO_PACK = (
     "--packed: no level has light beside its colours to write; --occlusion and --translucency give"
     " it some, --prelit takes it"
 )
-_WORKER_DIED = (
-    "the process that converted it, or one beside it, was ended from outside, mostly for want of"
-    " memory; fewer files at a time (-j) need less"
-)
 
 
-def _or_stop(stage: str, fraction: float) -> None:
-    """A worker's progress."""
-    from vegtool.workers import check_stop
-
-    check_stop()
-
-
-def _plant_of_level(name: str) -> str | None:
+def plant_of_level(name: str) -> str | None:
     """oak, where the name is that of a level of an oak, oak_LOD1, or of its shadow, oak_shadow."""
     found = re.fullmatch(r"(.+)_(?:lod\d+|shadow)", name, re.IGNORECASE | re.DOTALL)
     return found[1] if found else None
@@ -204,7 +185,7 @@ def _is_folder(path: Path) -> bool:
         return False
 
 
-def _models_in(folder: Path) -> list[Path]:
+def models_in(folder: Path) -> list[Path]:
     """The models in a folder, less the levels that an earlier run left there."""
     try:
         return sorted(
@@ -212,13 +193,13 @@ def _models_in(folder: Path) -> list[Path]:
             for p in folder.iterdir()
             if p.suffix.lower() in READERS
             and not p.is_dir()
-            and not (folder / f"{_plant_of_level(p.stem)}.lod.json").exists()
+            and not (folder / f"{plant_of_level(p.stem)}.lod.json").exists()
         )
     except OSError as error:
         raise InputError(f"{folder}: cannot be read ({error.strerror}); allow it") from error
 
 
-def _outcome(job: Job, task: Task, progress: Progress = silent) -> Outcome:
+def _outcome(task: Task, job: Job, progress: Progress) -> Outcome:
     try:
         return convert_file(job, task, progress)
     except VegtoolError as error:

@@ -73,6 +73,7 @@ SCHEMA: dict[str, dict[str, Key]] = {
         "slope_deg": Key("range", "slopes that it grows on", least=0, most=90),
         "elevation_m": Key("range", "heights of the ground that it grows at"),
         "density": Key("text", "file of a map that says where it grows"),
+        "aliases": Key("names", "other names that an inventory calls it"),
     },
     "placement": {
         "seed": _like("seed", "integer", "seed of every random choice"),
@@ -144,6 +145,10 @@ KINDS: dict[str, tuple[str, Callable[[Any], bool]]] = {
         "three points at least that are not on one line, [[x, z], [x, z], [x, z]]",
         lambda v: isinstance(v, list) and all(map(_is_pair, v)) and _has_area(v),
     ),
+    "names": (
+        'names in quotes, ["a", "b"]',
+        lambda v: isinstance(v, list) and all(isinstance(w, str) and w.strip() for w in v),
+    ),
     "words": (
         'names in quotes, { x = "easting" }',
         lambda v: isinstance(v, dict) and all(isinstance(word, str) for word in v.values()),
@@ -197,6 +202,7 @@ class SpeciesTable:
     slope_deg: Pair | None = None
     elevation_m: Pair | None = None
     density: str | None = None
+    aliases: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

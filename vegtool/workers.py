@@ -12,6 +12,8 @@ from multiprocessing import get_context
 from types import TracebackType
 from typing import TYPE_CHECKING, Protocol, Self, TypeVar
 
+from vegtool.progress import Progress, silent
+
 if TYPE_CHECKING:
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing.synchronize import Event
@@ -19,6 +21,10 @@ if TYPE_CHECKING:
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
+WORKER_DIED = (
+    "the process that converted it, or one beside it, was ended from outside, mostly for want of"
+    " memory; fewer files at a time (-j) need less"
+)
 TRIES = 3
 """Times that an item is begun whose process ends under it, before it counts as what ends it."""
 
@@ -122,6 +128,40 @@ class Processes:
         if self._pool is not None:
             self._pool.shutdown(cancel_futures=True)
             self._pool = None
+
+
+def side_by_side(
+    function: Callable[[Item, Progress], Result],
+    items: Sequence[Item],
+    died: Callable[[Item], Result],
+    workers: int,
+    progress: Callable[[Item], Progress] = lambda item: silent,
+) -> Iterator[Result]:
+    """What a function makes of items, in the order given, in so many processes, or in this one.
+
+    function, items, results: what `pickle` takes. died: the result, where the process was ended
+    from outside. progress: of an item; in other processes it is told when that is done, and how
+    many of all are. Raises what the function raises; what has not begun then does not begin.
+    """
+    if workers <= 1 or len(items) <= 1:
+        for item in items:
+            yield function(item, progress(item))
+        return
+    from concurrent.futures.process import BrokenProcessPool
+
+    with Processes(min(workers, len(items))) as crew:
+        futures = crew.submit(function, [(item, _or_stop) for item in items])
+        for done, (item, future) in enumerate(zip(items, futures, strict=True), start=1):
+            try:
+                yield future.result()
+            except BrokenProcessPool:
+                yield died(item)
+            progress(item)("done", done / len(items))
+
+
+def _or_stop(stage: str, fraction: float) -> None:
+    """A worker's progress."""
+    check_stop()
 
 
 _stop: Event | None = None

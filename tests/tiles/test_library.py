@@ -2,47 +2,27 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable
+import pickle
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from library_cases import TRIANGLES, edit, model, write
 from plants import plant_of
 
 from vegtool.errors import InputError
 from vegtool.formats import ReadOptions, read_plant
-from vegtool.formats.gltf import plant_glb, write_chain
-from vegtool.lod import FADE_FRACTION, Display, Level, LodChain
-from vegtool.seeding import generator
+from vegtool.lod import FADE_FRACTION, Display
 from vegtool.tiles import library
-from vegtool.tiles.library import MANIFEST, Species, read_library, read_species
-
-TRIANGLES = generator(0, "triangles").random((8, 3, 3))
-TRIANGLES[..., 1] += 1
-
-
-def write(folder: Path, name: str, distances: tuple[float, ...] = (10.0, 25.0)) -> Path:
-    """A chain of meshes of 8, 7, ... triangles; returns its manifest."""
-    levels = [Level("mesh", mesh=plant_of(TRIANGLES))]
-    for index, distance in enumerate(distances, start=1):
-        mesh = plant_of(TRIANGLES[: 8 - index])
-        levels.append(Level("mesh", mesh=mesh, near_distance_m=distance))
-    write_chain(LodChain(name, tuple(levels), Display(50.0, 900), 0), folder)
-    return folder / f"{name}{MANIFEST}"
-
-
-def edit(manifest: Path, change: Callable[[dict[str, Any]], None]) -> None:
-    values = json.loads(manifest.read_bytes())
-    change(values)
-    manifest.write_text(json.dumps(values))
-
-
-def model(folder: Path, name: str = "oak.glb") -> Path:
-    path = folder / name
-    path.write_bytes(plant_glb(plant_of(TRIANGLES)))
-    return path
+from vegtool.tiles.library import (
+    MANIFEST,
+    Species,
+    Stored,
+    read_library,
+    read_species,
+    stored_species,
+)
 
 
 def test_a_manifest_gives_levels_and_where_they_take_over(tmp_path: Path) -> None:
@@ -155,3 +135,41 @@ def test_species_are_checked_when_made() -> None:
             Species("s", levels, np.array(distances), np.zeros(len(levels)), 1.0, ())
     with pytest.raises(ValueError, match=r"Species\.fade"):
         Species("s", (plant,), np.zeros(1), np.zeros(2), 1.0, ())
+
+
+def test_stored_levels_are_read_when_they_are_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each time, as they are by `read_species`; what is asked of all of them, once, and a species
+    takes that along."""
+    manifest = write(tmp_path, "oak")
+    read: list[str] = []
+
+    def counted(path: Path) -> Any:
+        read.append(path.name)
+        return read_plant(path)
+
+    whole = read_species(manifest)
+    monkeypatch.setattr(library, "read_plant", counted)
+    oak = stored_species(manifest)
+    assert not read and len(oak.levels) == 3
+    np.testing.assert_array_equal(oak.levels[-1].positions, whole.levels[-1].positions)
+    assert read == ["oak_LOD2.glb"] and len(oak.levels[1:]) == 2
+    assert (oak.height, oak.size) == (whole.height, whole.size)
+    assert sorted(read[1:]) == sorted(file.name for file in oak.files)
+    sent = pickle.dumps(oak)
+    assert len(sent) < 2000
+    again = pickle.loads(sent)
+    np.testing.assert_array_equal(again.bounds, [level.bounds for level in whole.levels])
+    assert again.triangles.tolist() == whole.triangles.tolist() == [8, 7, 6]
+    assert len(read) == 4
+    (tmp_path / "oak_LOD1.glb").unlink()
+    with pytest.raises(InputError, match=r"oak_LOD1\.glb: expected a model file, found nothing"):
+        again.levels[1]
+
+
+def test_stored_levels_stand_where_they_are_moved(tmp_path: Path) -> None:
+    oak = stored_species(write(tmp_path, "oak"))
+    there = Stored(oak.files, (1.0, -2.0, 3.0))[1:]
+    away = there[0].positions - oak.levels[1].positions
+    np.testing.assert_allclose(away, np.broadcast_to([1.0, -2.0, 3.0], away.shape), atol=1e-12)

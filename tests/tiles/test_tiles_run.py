@@ -407,8 +407,9 @@ def test_a_scene_is_a_file_or_an_inventory(tmp_path: Path) -> None:
         scene_at(tmp_path / "plants.xml", plants)
     with pytest.raises(InputError, match=r"none\.csv: expected an inventory, found nothing there"):
         scene_at(tmp_path / "none.csv", plants)
-    with pytest.raises(InputError, match="found no manifest in it"):
-        scene_at(path, tmp_path)
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match="found none in it"):
+        scene_at(path, tmp_path / "empty")
 
 
 # -------------------------------------------------------------------------------------- as drawn

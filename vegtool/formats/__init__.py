@@ -100,6 +100,20 @@ def read_plant(path: str | Path, options: ReadOptions = ReadOptions()) -> Plant:
         ) from error
 
 
+def read_with_files(
+    path: Path, options: ReadOptions = ReadOptions()
+) -> tuple[Plant, tuple[Path, ...]]:
+    """A plant model, and all files that it consists of: itself, then what it refers to, each once.
+
+    Raises as `read_plant`.
+    """
+    from vegtool.formats.beside import found_files
+
+    with found_files() as beside:
+        plant = read_plant(path, options)
+    return plant, tuple(dict.fromkeys([path, *beside]))
+
+
 def _read(path: Path, options: ReadOptions) -> Plant:
     try:
         path.lstat()

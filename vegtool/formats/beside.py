@@ -8,12 +8,28 @@ from the artist's machine (`C:/art/leaf.png`) are looked up by file name instead
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from urllib.parse import unquote
 
 from vegtool.errors import InputError
 
 WINDOWS_ROOT = re.compile(r"^(?:[A-Za-z]:|//|\\\\)")
+
+_found: ContextVar[list[Path] | None] = ContextVar("_found", default=None)
+
+
+@contextmanager
+def found_files() -> Iterator[list[Path]]:
+    """The files that `find_beside` finds as long as this is open, in order."""
+    files: list[Path] = []
+    token = _found.set(files)
+    try:
+        yield files
+    finally:
+        _found.reset(token)
 
 
 def find_beside(model: Path, reference: str, percent_encoded: bool = False) -> Path | None:
@@ -43,6 +59,9 @@ def find_beside(model: Path, reference: str, percent_encoded: bool = False) -> P
     )
     if found is not None and not found.resolve().is_relative_to(folder):
         raise refused
+    files = _found.get()
+    if found is not None and files is not None:
+        files.append(found)
     return found
 
 

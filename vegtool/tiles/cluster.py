@@ -39,7 +39,8 @@ class Cluster:
                 "--dask: expected Dask, found none; install it with: pip install 'vegtool[cluster]'"
             ) from error
         try:
-            self._client: Any = Client(address, timeout=TIMEOUT_S, set_as_default=False)
+            connect: Any = Client  # untyped
+            self._client: Any = connect(address, timeout=TIMEOUT_S, set_as_default=False)
         except (OSError, ValueError, TimeoutError) as error:
             raise UsageError(
                 f"--dask {address}: expected a Dask scheduler, found none that answers ({error}); "

@@ -49,7 +49,7 @@ def run_tiles(
     inputs = Inputs(scene.absolute(), library.absolute(), out.absolute(), options)
     _check_out(inputs, run.force)
     with bar("reading") as progress:
-        world = world_of(inputs, progress)
+        world = world_of(inputs, progress, run.jobs or os.cpu_count() or 1)
     inputs = replace(inputs, digest=world.digest)
     for note in world.pyramid.notes:
         say(note)

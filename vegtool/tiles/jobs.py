@@ -149,14 +149,14 @@ class Failed:
 Outcome = Made | Failed
 
 
-def world_of(inputs: Inputs, progress: Progress = silent) -> World:
-    """All that jobs need.
+def world_of(inputs: Inputs, progress: Progress = silent, workers: int = 1) -> World:
+    """All that jobs need. What species lack is made first, in so many processes.
 
     Raises UsageError and InputError for what is missing or broken, InputError for what is not as
     the digest says.
     """
     scene = scene_at(inputs.scene, inputs.library)
-    pyramid = pyramid_of(scene, inputs.library, inputs.options, progress)
+    pyramid = pyramid_of(scene, inputs.library, inputs.options, progress, workers)
     digest = _digest(scene, pyramid)
     if inputs.digest not in (None, digest):
         raise InputError(

@@ -40,7 +40,7 @@ def triangles(species: Sequence[Species]) -> FloatArray:
     most = max(len(one.levels) for one in species)
     found = np.zeros((len(species), most))
     for index, one in enumerate(species):
-        found[index, : len(one.levels)] = [len(level.faces) for level in one.levels]
+        found[index, : len(one.levels)] = one.triangles
     return found
 
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
+from typing import overload
 
 import numpy as np
 
-from vegtool.arrays import FloatArray, checked
+from vegtool.arrays import FloatArray, IntArray, checked
 from vegtool.errors import InputError
 from vegtool.formats import READERS, ReadOptions, read_plant
 from vegtool.formats.beside import find_beside
@@ -19,18 +22,50 @@ from vegtool.progress import Progress, silent
 MANIFEST = ".lod.json"
 
 
+@dataclass(frozen=True)
+class Stored(Sequence[Plant]):
+    """Plants that are read anew each time they are asked for: nobody keeps what nobody looks at.
+
+    shift: (x, y, z) metres by which they are moved. Raises InputError, when asked, for a file that
+    is missing or broken.
+    """
+
+    files: tuple[Path, ...]
+    shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def __len__(self) -> int:
+        return len(self.files)
+
+    @overload
+    def __getitem__(self, index: int) -> Plant: ...
+    @overload
+    def __getitem__(self, index: slice) -> Stored: ...
+    def __getitem__(self, index: int | slice) -> Plant | Stored:
+        if isinstance(index, slice):
+            return replace(self, files=self.files[index])
+        return moved(read_plant(self.files[index]), np.array(self.shift))
+
+
+def moved(plant: Plant, shift: FloatArray) -> Plant:
+    """A plant elsewhere, by (3,) metres; nobody needs its branches there."""
+    if not shift.any():
+        return plant
+    return replace(plant, positions=plant.positions + shift, branches=None)
+
+
 @dataclass(frozen=True, eq=False)
 class Species:
     """A plant and its levels, as files give them.
 
-    levels: the original, then coarser and coarser. switch_m: (n,) metres, from where each may be
-    used, 0 for the original, in pictures in which a metre at a distance of one is `focal_px`
-    pixels. fade: (n,) share of that distance along which it replaces the one before. files: where
-    each was read.
+    levels: the original, then coarser and coarser; a tuple, or Stored. switch_m: (n,) metres, from
+    where each may be used, 0 for the original, in pictures in which a metre at a distance of one is
+    `focal_px` pixels. fade: (n,) share of that distance along which it replaces the one before.
+    files: where each was read. What is asked of all levels is read once, and kept when a species
+    goes to another process.
     """
 
     name: str
-    levels: tuple[Plant, ...]
+    levels: Sequence[Plant]
     switch_m: FloatArray
     fade: FloatArray
     focal_px: float
@@ -44,15 +79,34 @@ class Species:
         if not count or self.switch_m[0] != 0 or (np.diff(self.switch_m) <= 0).any():
             raise ValueError("Species.switch_m: expected 0, then ascending distances")
 
+    @cached_property
+    def _outline(self) -> tuple[FloatArray, IntArray]:
+        """The two that follow."""
+        bounds, faces = [], []
+        for level in self.levels:
+            bounds.append(level.bounds)
+            faces.append(len(level.faces))
+        return np.array(bounds), np.array(faces, np.int32)
+
+    @property
+    def bounds(self) -> FloatArray:
+        """(n, 2, 3) metres: of each level, the least and the greatest coordinates."""
+        return self._outline[0]
+
+    @property
+    def triangles(self) -> IntArray:
+        """(n,) int32 of each level."""
+        return self._outline[1]
+
     @property
     def height(self) -> float:
         """Metres, of the original above its foot."""
-        return float(self.levels[0].bounds[1, 1])
+        return float(self.bounds[0, 1, 1])
 
     @property
     def size(self) -> float:
         """Metres: nothing of the original is farther from its foot."""
-        return float(np.linalg.norm(np.abs(self.levels[0].bounds).max(axis=0)))
+        return float(np.linalg.norm(np.abs(self.bounds[0]).max(axis=0)))
 
 
 def read_library(path: Path, read: ReadOptions, progress: Progress = silent) -> list[Species]:
@@ -92,12 +146,24 @@ def read_library(path: Path, read: ReadOptions, progress: Progress = silent) -> 
 def read_species(path: Path, progress: Progress = silent) -> Species:
     """The plant of a manifest. Raises InputError where it, or a file that it names, is missing or
     broken."""
+    found = stored_species(path)
+    levels = []
+    for index, file in enumerate(found.files):
+        progress(f"{found.name}: {file.name}", index / len(found.files))
+        levels.append(read_plant(file))
+    return replace(found, levels=tuple(levels))
+
+
+def stored_species(path: Path) -> Species:
+    """The plant of a manifest, whose levels are read when they are asked for.
+
+    Raises InputError where the manifest is missing or broken, or a file that it names is missing.
+    """
     told = read_manifest(path)
     shown = Display(told["fov_y_deg"], told["image_height_px"])
     names = [told["combined"]["file"], *(level["file"] for level in told["levels"][1:])]
-    files, levels = [], []
-    for index, name in enumerate(names):
-        progress(f"{told['name']}: {name}", index / len(names))
+    files = []
+    for name in names:
         file = find_beside(path, name)
         if file is None:
             raise InputError(
@@ -105,7 +171,6 @@ def read_species(path: Path, progress: Progress = silent) -> Species:
                 "the plant again."
             )
         files.append(file)
-        levels.append(read_plant(file))
     distances = np.array([level["switch_distance_m"] for level in told["levels"]], np.float64)
     if distances[0] != 0 or (np.diff(distances) <= 0).any():
         listed = ", ".join(f"{distance:g}" for distance in distances)
@@ -118,4 +183,5 @@ def read_species(path: Path, progress: Progress = silent) -> Species:
     fade[0] = 0.0
     np.divide(ends - distances, distances, out=fade, where=distances > 0)
     focal = shown.pixels_per_metre(1.0)
-    return Species(told["name"], tuple(levels), distances, fade, focal, tuple(files))
+    stored = Stored(tuple(files))
+    return Species(told["name"], stored, distances, fade, focal, stored.files)

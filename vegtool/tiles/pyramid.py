@@ -16,7 +16,6 @@ import numpy as np
 
 from vegtool.arrays import FloatArray
 from vegtool.errors import UsageError
-from vegtool.formats import ReadOptions
 from vegtool.lod import Display
 from vegtool.progress import Progress, silent
 from vegtool.scene import Scene
@@ -24,8 +23,8 @@ from vegtool.tiles.levels import level_at, switches, triangles
 from vegtool.tiles.library import Species
 from vegtool.tiles.options import TileOptions
 from vegtool.tiles.placement import Placement, placement_of
+from vegtool.tiles.prepare import prepare
 from vegtool.tiles.quadtree import Node, Quadtree, quadtree_of
-from vegtool.tiles.species import species_of
 from vegtool.tiles.stand import Stand, stand_on
 from vegtool.tiles.terrain import terrain_of
 
@@ -135,7 +134,7 @@ class Pyramid:
         """(2, 3) metres around a foot that no plant is beyond, however it is turned."""
         found = np.zeros((2, 3))
         for one, scale in zip(self.species, self.largest, strict=True):
-            bounds = np.array([level.bounds for level in one.levels])
+            bounds = one.bounds
             low, high = scale * bounds[:, 0].min(axis=0), scale * bounds[:, 1].max(axis=0)
             side = np.abs(np.stack([low, high]))[:, [0, 2]].max(axis=0)
             aside = float(np.hypot(*side))
@@ -155,7 +154,11 @@ class Pyramid:
 
 
 def pyramid_of(
-    scene: Scene, library: Path, options: TileOptions, progress: Progress = silent
+    scene: Scene,
+    library: Path,
+    options: TileOptions,
+    progress: Progress = silent,
+    workers: int = 1,
 ) -> Pyramid:
     """The pyramid of a scene with the plants of a library.
 
@@ -163,12 +166,13 @@ def pyramid_of(
     """
     terrain = terrain_of(scene)
     placement = placement_of(scene, terrain, options.tile, lambda s, f: progress(s, f / 2))
-    found = species_of(scene, library, ReadOptions(), lambda s, f: progress(s, (1 + f) / 2))
     if not len(placement.tiles):
         raise UsageError(
             f"{scene.path}: expected plants, found none that stands on the ground of the scene. "
             "Check [placement], and where [[species]] may grow"
         )
+    found = prepare(scene, placement, library, workers, lambda s, f: progress(s, (1 + f) / 2))
+    placement = found.placement
     tree = quadtree_of(placement.tiles, placement.tile_m, _above(placement, options))
     notes = (*terrain.notes, *placement.notes, *found.notes)
     return Pyramid(placement, found.species, tree, options, Display(), terrain.crs, notes)

@@ -166,10 +166,16 @@ class _Kinds:
                 raise UsageError(
                     f"{at}: expected a name, by which {table.path} can call it; got none"
                 )
-            if _plain(kind.name) in self.known:
-                raise UsageError(f"{at}: name: two species are called {kind.name}; rename one")
-            self.known[_plain(kind.name)] = index
+            for plain, name in {_plain(name): name for name in (kind.name, *kind.aliases)}.items():
+                if plain in self.known:
+                    raise UsageError(f"{at}: name: two species are called {name}; rename one")
+                self.known[plain] = index
             self.names.append(kind.name)
+        self.remedy = "correct it, or add a [[species]] of that name to the scene"
+        if scene.path == table.path:
+            self.remedy = (
+                "correct it, or put a plant of that name, or with it as an alias, into the library"
+            )
 
     def indices(self, values: Sequence[Value] | None, count: int, first: int) -> IntArray:
         """(n,) int32 of the species of rows, `first` being the number of the first."""
@@ -184,7 +190,7 @@ class _Kinds:
                         self.table.names[self.column],
                         f"one of {', '.join(self.names)}",
                         value,
-                        "correct it, or add a [[species]] of that name to the scene",
+                        self.remedy,
                     )
                 self.met[value] = index
         return np.fromiter(map(self.met.__getitem__, values), np.int32, count)

@@ -5,8 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from vegtool.errors import InputError, UsageError
-from vegtool.scene import PlacementTable, Scene, SpeciesTable, read_scene
+from vegtool.formats import READERS
+from vegtool.scene import PlacementTable, Scene, read_scene
 from vegtool.tiles.library import MANIFEST
+from vegtool.tiles.named import TABLES, library_at
+from vegtool.tiles.species import folder_of
 
 INVENTORIES = (".csv", ".tsv", ".txt", ".json", ".geojson")
 """Extensions of files with a row per plant."""
@@ -25,11 +28,11 @@ def scene_at(path: Path, library: Path) -> Scene:
         )
     if not path.exists():
         raise InputError(f"{path}: expected an inventory, found nothing there. Check the path.")
-    names = sorted(file.name.removesuffix(MANIFEST) for file in library.glob(f"*{MANIFEST}"))
-    if not names:
+    species = library_at(folder_of(library)).species()
+    if not species:
         raise InputError(
-            f"{library}: expected a folder of converted plants (NAME{MANIFEST}), one for each "
-            "species, found no manifest in it. Convert plants into it"
+            f"{library}: expected a folder of plants, one for each species: converted "
+            f"(NAME{MANIFEST}), models ({', '.join(READERS)}), folders of one, or {TABLES}; found "
+            "none in it. Put plants into it"
         )
-    species = tuple(SpeciesTable(name=name) for name in names)
     return Scene(path, species=species, placement=PlacementTable(inventory=path.name))

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from vegtool.arrays import FloatArray
 from vegtool.errors import InputError, UsageError
 from vegtool.formats import ReadOptions
+from vegtool.plant import Plant
 from vegtool.progress import Progress, silent
 from vegtool.scene import Scene
-from vegtool.tiles.library import MANIFEST, Species, read_library
+from vegtool.tiles.library import MANIFEST, Species, Stored, moved, read_library
+from vegtool.tiles.named import TABLES, Library, Source, library_at, plant_at
 
 ROOTED, BESIDE = 0.1, 1.0
 """Of its size, how far below or above the origin of its file a plant that stands there may begin,
@@ -29,36 +33,35 @@ class Found:
 
 
 def species_of(scene: Scene, folder: Path, read: ReadOptions, progress: Progress = silent) -> Found:
-    """The plants of all [[species]], from a folder of converted plants (or a manifest in it), or as
-    the scene names their models.
+    """The plants of all [[species]], from a folder of plants (or a manifest in it), or as the scene
+    names their models. Nothing is converted: a model has no levels but itself.
 
     Raises InputError and UsageError for what is missing or broken.
     """
-    sources = [source_of(folder, scene, index) for index in range(len(scene.species))]
-    if all(source.name.endswith(MANIFEST) for source in sources):
+    library = library_at(folder_of(folder))
+    sources = [source_of(library, scene, index) for index in range(len(scene.species))]
+    if all(source.converted for source in sources):
         check_reading(read, folder)
     species: list[Species] = []
     notes: list[str] = []
     for source, table in zip(sources, scene.species, strict=True):
-        progress(f"plants: {table.name or source.name}", len(species) / len(sources))
-        (one,) = read_library(source, read)
+        path, usual = source.path, source.read == ReadOptions()
+        progress(f"plants: {table.name or path.name}", len(species) / len(sources))
+        (one,) = read_library(path, read if usual else source.read)
         stands, away = placed(one)
-        low, high = stands.levels[0].bounds
-        if not high[1] > FLAT * (high - low).max():
-            raise InputError(
-                f"{source}: expected a plant that has a height, y up, found one that is flat: "
-                f"{high[1]:.3g} m high. Where another axis is up, convert it with --up"
-            )
+        check_height(path, stands.bounds[0])
         species.append(stands)
-        if not source.name.endswith(MANIFEST):
-            notes.append(f"{source}: has no levels of detail; vegtool convert makes them")
+        if not source.converted:
+            notes.append(f"{path}: has no levels of detail; vegtool convert makes them")
             notes += notes_on(one)
         if away:
-            notes.append(
-                f"{source}: is {away:,.1f} m away from the origin of its file; what is placed is "
-                "its middle, on the ground"
-            )
+            notes.append(note_on_place(path, away))
     return Found(tuple(species), tuple(notes))
+
+
+def folder_of(path: Path) -> Path:
+    """The folder of plants that is meant by itself, or by a manifest in it."""
+    return path.parent if path.name.endswith(MANIFEST) and not path.is_dir() else path
 
 
 def check_reading(read: ReadOptions, path: Path) -> None:
@@ -70,46 +73,44 @@ def check_reading(read: ReadOptions, path: Path) -> None:
         )
 
 
-def source_of(path: Path, scene: Scene, index: int) -> Path:
-    """The file of a table's species: what was converted under its name or its model's, else its
-    model."""
-    table = scene.species[index]
-    folder = path if path.is_dir() else path.parent
-    place = None if table.model is None else scene.path.parent / table.model
-    if place is not None and place.name.endswith(MANIFEST):
-        return place
-    if place is not None and place.is_dir():
-        return _manifest_in(place, scene, index)
-    names = [table.name, None if place is None else place.stem]
-    converted = [folder / f"{name}{MANIFEST}" for name in names if name is not None]
-    for manifest in converted:
-        if manifest.exists():
-            return manifest
-    if place is None:
-        wanted = converted[0] if converted else folder / f"NAME{MANIFEST}"
+def check_height(path: Path, bounds: FloatArray) -> None:
+    """Raise InputError for a plant, of bounds (2, 3), that no height can be given to."""
+    low, high = bounds
+    if not high[1] > FLAT * (high - low).max():
         raise InputError(
-            f"{scene.at('species', index)}: expected a model, or a plant converted under the name "
-            f"of the species, {wanted}; found none. Convert it, or say model = ..."
+            f"{path}: expected a plant that has a height, y up, found one that is flat: "
+            f"{high[1]:.3g} m high. Where another axis is up, convert it with --up"
+        )
+
+
+def source_of(library: Library, scene: Scene, index: int) -> Source:
+    """The plant of a table's species: what the library has under its name or its model's, unless
+    the table names a manifest or a folder; else its model.
+
+    Raises InputError where there is none, UsageError where there are several.
+    """
+    table, at = scene.species[index], scene.at("species", index)
+    place = None if table.model is None else scene.path.parent / table.model
+    if place is not None and (place.name.endswith(MANIFEST) or place.is_dir()):
+        return Source(plant_at(place, table.name, scene.at("species", index, "model")))
+    names = [name for name in (table.name, None if place is None else place.stem) if name]
+    ways = [library.told, library.converted if place is not None else library.lying]
+    for way, name in ((way, name) for way in ways for name in names):
+        if (found := way(name)) is not None:
+            return found
+    if place is None:
+        wanted = f"{names[0]!r}" if names else "as the species"
+        raise InputError(
+            f"{at}: expected a model, or a plant called {wanted} in {library.folder}: a table of "
+            f"{TABLES}, NAME{MANIFEST}, a model or a folder; found none. Convert it, or say "
+            "model = ..."
         )
     if not place.exists():
         raise InputError(
             f"{scene.at('species', index, 'model')}: expected the model {place}, or the plant "
-            f"converted, {converted[0]}; found neither. Check the names"
+            f"converted, {library.folder / names[0]}{MANIFEST}; found neither. Check the names"
         )
-    return place
-
-
-def _manifest_in(place: Path, scene: Scene, index: int) -> Path:
-    """The manifest of a species in a folder that the scene names."""
-    found = sorted(place.glob(f"*{MANIFEST}"))
-    named = [one for one in found if one.name == f"{scene.species[index].name}{MANIFEST}"]
-    if len(named or found) != 1:
-        names = ", ".join(one.name for one in found) or "no manifest"
-        raise UsageError(
-            f"{scene.at('species', index, 'model')}: expected one plant in {place}, or one of the "
-            f"species' name; found {names}. Name a manifest, NAME{MANIFEST}"
-        )
-    return (named or found)[0]
+    return Source(place)
 
 
 def notes_on(one: Species) -> list[str]:
@@ -117,21 +118,38 @@ def notes_on(one: Species) -> list[str]:
     return [f"{one.files[0]}: {note}" for note in one.levels[0].notes]
 
 
+def note_on_place(path: Path, away: float) -> str:
+    """What is said of a plant that many metres from the origin of its file."""
+    return (
+        f"{path}: is {away:,.1f} m away from the origin of its file; what is placed is its middle, "
+        "on the ground"
+    )
+
+
 def placed(one: Species) -> tuple[Species, float]:
     """The plant with its foot at the origin, as it is to stand; and how many metres it was off.
 
     One that is about there already is as it was: a crown may lean, and roots go into the ground.
     """
-    low, high = one.levels[0].bounds
+    shift = shift_of(one.bounds[0])
+    if not shift.any():
+        return one, 0.0
+    levels: Sequence[Plant]
+    if isinstance(one.levels, Stored):
+        x, y, z = shift.tolist()
+        levels = replace(one.levels, shift=(x, y, z))
+    else:
+        levels = tuple(moved(level, shift) for level in one.levels)
+    return replace(one, levels=levels), float(np.linalg.norm(shift))
+
+
+def shift_of(bounds: FloatArray) -> FloatArray:
+    """(3,) metres by which a plant of bounds (2, 3) is moved to its place."""
+    low, high = bounds
     size = high - low
     shift = np.zeros(3)
     if np.abs(low + high)[[0, 2]].max() / 2 > BESIDE * size.max():
         shift[[0, 2]] = -(low + high)[[0, 2]] / 2
     if abs(low[1]) > ROOTED * size.max():
         shift[1] = -low[1]
-    if not shift.any():
-        return one, 0.0
-    levels = tuple(
-        replace(level, positions=level.positions + shift, branches=None) for level in one.levels
-    )
-    return replace(one, levels=levels), float(np.linalg.norm(shift))
+    return shift
