@@ -8,7 +8,7 @@ from vegtool.errors import InputError, UsageError
 from vegtool.scene import PlacementTable, Scene, SpeciesTable, read_scene
 from vegtool.tiles.library import MANIFEST
 
-INVENTORIES = (".csv", ".tsv", ".txt", ".json", ".geojson")
+INVENTORIES = (".csv", ".tsv", ".txt", ".json", ".geojson", ".gpkg", ".las", ".laz")
 """Extensions of files with a row per plant."""
 
 
