@@ -6,6 +6,7 @@ records of a coordinate reference system, as well-known text or as GeoTIFF's key
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
@@ -22,6 +23,9 @@ from vegtool.tiles.wkt import Described, described
 POINTS = 8192
 """Of a part."""
 AXES = ("x", "y", "z")
+MAGIC = b"LASF"
+RECORDS_AT, RECORD = 100, 54
+"""Bytes: where a header says how many variable length records there are, and the least of one."""
 MAP_KEY, WORLD_KEY, UNIT_KEY = 3072, 2048, 3076
 """GeoTIFF's keys of a map, of longitude and latitude, and of the unit of lengths."""
 METRE = 9001
@@ -50,19 +54,13 @@ def read(path: Path) -> Table:
 
     def parts(wanted: Sequence[int]) -> Iterator[Part]:
         with _opened(path) as file:
-            read = 0
             for points in file.chunk_iterator(POINTS):
-                read += len(points)
                 yield tuple(_values(points, names[index]) for index in wanted)
-            if read < file.header.point_count:
-                raise InputError(
-                    f"{path}: expected {file.header.point_count:,} points, found {read:,}; the "
-                    "file is cut short: copy it again"
-                )
 
     return Table(
         path, names, parts, lambda row: f"point {row:,}", {axis: i for i, axis in enumerate(AXES)},
-        geographic=found is not None and found.geographic, crs=found and found.crs,
+        geographic=None if found is None else found.geographic,
+        crs=None if found is None else found.crs,
     )  # fmt: skip
 
 
@@ -78,16 +76,37 @@ def _opened(path: Path) -> Iterator[Any]:
             f"{path}: LAS and LAZ are read by laspy and lazrs, and {error.name} is not installed; "
             "run pip install 'vegtool[geo]', or export the points as .csv or .gpkg"
         ) from None
-    path.open("rb").close()  # a reason of the system's own, where it cannot be read
+    _check_records(path)
     try:
-        with laspy.open(path) as file:
+        with laspy.open(path, laz_backend=laspy.LazBackend.Lazrs) as file:
+            header = file.header
+            end = header.offset_to_point_data + header.point_count * header.point_format.size
+            if not header.are_points_compressed and end > path.stat().st_size:
+                raise InputError(
+                    f"{path}: expected {header.point_count:,} points, {end:,} bytes, found "
+                    f"{path.stat().st_size:,} bytes; copy or export it again"
+                )
             yield file
-    except (InputError, CapabilityError):
+    except (InputError, GeneratorExit, KeyboardInterrupt):
         raise
-    except Exception as error:  # laspy passes on whatever a broken file makes Python say
+    except BaseException as error:  # whatever a broken file leads to: lazrs panics, in Rust's words
         raise InputError(
             f"{path}: expected LAS or LAZ; {error or type(error).__name__}; export it again"
         ) from None
+
+
+def _check_records(path: Path) -> None:
+    """Raise InputError for more records than there is room for, which laspy would look for one by
+    one."""
+    with path.open("rb") as file:
+        head = file.read(RECORDS_AT + 4)
+    if head[:4] == MAGIC and len(head) == RECORDS_AT + 4:
+        (count,) = struct.unpack_from("<I", head, RECORDS_AT)
+        if count * RECORD > path.stat().st_size:
+            raise InputError(
+                f"{path}: expected LAS or LAZ, found {count:,} records in a file of "
+                f"{path.stat().st_size:,} bytes; export it again"
+            )
 
 
 def _values(points: Any, name: str) -> Sequence[Value]:
@@ -97,10 +116,10 @@ def _values(points: Any, name: str) -> Sequence[Value]:
 
 def _described(records: Any) -> Described | None:
     """The coordinate reference system, where one is said."""
-    for record in records:
-        if text := getattr(record, "string", None):
-            if (found := described(text)) is not None:
-                return found
+    for text in (getattr(record, "string", "") for record in records):
+        found = described(text)
+        if found is not None:
+            return found
     for record in records:
         keys = {key.id: key.value_offset for key in getattr(record, "geo_keys", ())}
         for number in (MAP_KEY, WORLD_KEY):
