@@ -61,7 +61,9 @@ def test_it_is_a_similarity(crs: str, x: float, y: float) -> None:
 
 @pytest.mark.parametrize(("crs", "x", "y"), PLACES)
 @pytest.mark.parametrize("height", [0.0, 800.0])
-def test_places_around_are_where_proj_puts_them(crs: str, x: float, y: float, height: float) -> None:
+def test_places_around_are_where_proj_puts_them(
+    crs: str, x: float, y: float, height: float
+) -> None:
     """Within 100 m, to a fifth of a millimetre, less the sag of a flat frame: d squared over the
     earth's diameter. 270 km from its meridian a map's scale grows by 6e-9 with each metre."""
     warp = pytest.importorskip("rasterio.warp", reason="the extra [geo] is not installed")
@@ -84,7 +86,9 @@ def test_the_frame_is_flat() -> None:
     found = matrix("EPSG:32632", x, y)
     up = found[:3, 2] / np.linalg.norm(found[:3, 2])
     off = (moved(found, np.array([[0.0, 5000.0, 0.0]])) - there[1:]) @ up
-    assert off == pytest.approx(5000**2 / (2 * EARTH), rel=0.01) and off == pytest.approx(2, abs=0.1)
+    assert off == pytest.approx(5000**2 / (2 * EARTH), rel=0.01) and off == pytest.approx(
+        2, abs=0.1
+    )
 
 
 def test_heights_are_exact_where_plants_stand() -> None:
@@ -187,7 +191,9 @@ def test_without_a_map_there_is_no_place(tmp_path: Path) -> None:
 
 def test_a_map_without_an_origin_is_said(tmp_path: Path) -> None:
     """Coordinates near 0 are the scene's own, wherever on the map that is."""
-    ground, placement = placed(tmp_path, '[terrain]\ncrs = "EPSG:25832"', ["3,4,ash"], "x,y,species")
+    ground, placement = placed(
+        tmp_path, '[terrain]\ncrs = "EPSG:25832"', ["3,4,ash"], "x,y,species"
+    )
     assert placement.crs is None
     (note,) = notes_on(ground, placement)
     assert note.startswith("EPSG:25832: expected where the scene's origin is on this map")
@@ -214,9 +220,9 @@ def test_other_maps_need_rasterio(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 @pytest.mark.parametrize(
     ("crs", "place", "says"),
     [
-        ("EPSG:2154", (1e9, 1e9), "expected a map on which a metre is one on the ground to 2%, fou"),
-        ("EPSG:3857", (1e6, 6e6), "found one of 0.677 m; tiles are put nowhere on the earth; repro"),
-        ("EPSG:99999", (0, 0), "expected a map that PROJ knows, found none of that name; tiles are"),
+        ("EPSG:2154", (1e9, 1e9), "expected a map on which a metre is one on the ground to 2%, f"),
+        ("EPSG:3857", (1e6, 6e6), "found one of 0.677 m; tiles are put nowhere on the earth; rep"),
+        ("EPSG:99999", (0, 0), "expected a map that PROJ knows, found none of that name; tiles "),
     ],
 )  # fmt: skip
 def test_places_that_are_none(crs: str, place: tuple[float, float], says: str) -> None:

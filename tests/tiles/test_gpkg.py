@@ -44,9 +44,7 @@ def point(*coordinates: float, envelope: int = 0, big: bool = False, more: int =
     box = b"\0" * (0, 32, 48, 48, 64)[envelope]
     head = b"GP\0" + bytes([1 | envelope << 1]) + struct.pack("<i", 25832) + box
     kind = 1 + (more or 1000 * (len(coordinates) == 3))
-    return head + struct.pack(
-        f"{order}BI{len(coordinates)}d", 0 if big else 1, kind, *coordinates
-    )
+    return head + struct.pack(f"{order}BI{len(coordinates)}d", 0 if big else 1, kind, *coordinates)
 
 
 Row = tuple[Any, ...]
@@ -138,7 +136,10 @@ def test_points_with_heights(tmp_path: Path) -> None:
 def test_tree_tops_of_lidr(tmp_path: Path) -> None:
     """What locate_trees writes: z is how high a tree is, and stands in an attribute too. It is not
     where its foot is."""
-    rows = [(point(481_294.7, 3_813_011.0, 16.0), 1, 16.0), (point(481_281.9, 3_813_003.0, 27), 2, 27)]
+    rows = [
+        (point(481_294.7, 3_813_011.0, 16.0), 1, 16.0),
+        (point(481_281.9, 3_813_003.0, 27), 2, 27),
+    ]
     geopackage(tmp_path / "trees.gpkg", "treeID INTEGER, Z REAL", rows, z=1)
     scene = '[[species]]\nmodel = "a.glb"\n[placement]\ninventory = "trees.gpkg"\n'
     data = (tmp_path / "trees.gpkg").read_bytes()
@@ -205,17 +206,17 @@ LINE = b"GP\0\1" + struct.pack("<iBII4d", 25832, 1, 2, 2, 0, 0, 1, 1)
 @pytest.mark.parametrize(
     ("rows", "says"),
     [
-        ([(point(1, 2), "ash"), (LINE, "ash")], "feature 2: expected a Point, found LineString; re"),
-        ([(None, "ash")], "feature 1: expected a Point, found no geometry; remove it, or export po"),
+        ([(point(1, 2), "ash"), (LINE, "ash")], "feature 2: expected a Point, found LineString; "),
+        ([(None, "ash")], "feature 1: expected a Point, found no geometry; remove it, or export"),
         ([("POINT (1 2)", "ash")], "feature 1: expected a Point, found no binary one; remove it"),
         ([(b"GP\0\1" + b"\xff" * 40, "ash")], "feature 1: expected a Point, found "),
         ([(point(1, 2)[:20], "ash")], "feature 1: expected a Point, found a broken one; remove it"),
         ([(b"GP", "ash")], "feature 1: expected a Point, found a broken one; remove it, or export"),
-        ([(point(1, 2)[8:], "ash")], "feature 1: expected a Point, found something else; remove it"),
+        ([(point(1, 2)[8:], "ash")], "feature 1: expected a Point, found something else; remove"),
         ([(b"GP\0\x11" + point(1, 2)[4:], "ash")], "expected a Point, found an empty one; remove"),
-        ([(point(np.nan, 2), "ash")], "feature 1, column geom x: expected a number, found nan; corr"),
-        ([(point(1, np.inf), "ash")], "feature 1, column geom y: expected a number, found inf; corr"),
-        ([(point(1, 2), None)], "feature 1, column species: expected one of ash, pine, found nothi"),
+        ([(point(np.nan, 2), "ash")], "feature 1, column geom x: expected a number, found nan; "),
+        ([(point(1, np.inf), "ash")], "feature 1, column geom y: expected a number, found inf; "),
+        ([(point(1, 2), None)], "feature 1, column species: expected one of ash, pine, found "),
         ([], "trees.gpkg: expected a row for each plant, found none; add some"),
     ],
 )  # fmt: skip
@@ -225,9 +226,7 @@ def test_features_that_are_no_plants(tmp_path: Path, rows: list[Row], says: str)
 
 
 def test_several_tables_are_listed(tmp_path: Path) -> None:
-    geopackage(
-        tmp_path / "trees.gpkg", "species TEXT", [(point(1, 2), "ash")], tables=["b", "a"]
-    )
+    geopackage(tmp_path / "trees.gpkg", "species TEXT", [(point(1, 2), "ash")], tables=["b", "a"])
     said = refusal(tmp_path, UsageError)
     assert "trees.gpkg: expected one table of features, found 2: a, b; put that of the" in said
     geopackage(tmp_path / "trees.gpkg", "species TEXT", [], tables=[])
@@ -239,7 +238,9 @@ def test_several_tables_are_listed(tmp_path: Path) -> None:
 def test_maps_in_feet(tmp_path: Path) -> None:
     geopackage(tmp_path / "trees.gpkg", "species TEXT", [(point(1, 2), "ash")], 2225)
     said = refusal(tmp_path)
-    assert "expected coordinates in metres or degrees, found those of EPSG:2225 in US survey" in said
+    assert (
+        "expected coordinates in metres or degrees, found those of EPSG:2225 in US survey" in said
+    )
 
 
 def test_files_that_are_no_geopackage(tmp_path: Path) -> None:
