@@ -1,4 +1,4 @@
-"""`vegtool tiles` with wrong input: a sentence naming file and row, the right exit code, no files."""
+"""`vegtool tiles` with wrong input: a sentence naming file and row, its exit code, and no files."""
 
 from __future__ import annotations
 

@@ -76,10 +76,8 @@ class Table:
     ) -> InputError:
         """What is said of a value that cannot be."""
         what = f"{found!r:.60}" if isinstance(found, str) and found.strip() else "nothing"
-        if isinstance(found, float):
-            what = f"{found:.15g}"
-        elif isinstance(found, int):
-            what = f"{found!s:.60}"
+        if isinstance(found, float | int):  # whole numbers may be more than a float can be
+            what = f"{found:.15g}" if abs(found) < 1e300 else f"{found!s:.60}"
         return InputError(
             f"{self.path}, {self.place(row)}, column {column}: expected {expected}, found {what}; "
             f"{remedy or 'correct or remove the row'}"
