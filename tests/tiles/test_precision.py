@@ -121,11 +121,8 @@ def off(found: np.ndarray, wanted: np.ndarray) -> float:
 @pytest.mark.parametrize(
     ("side_m", "options"),
     [
-        pytest.param(
-            120.0, {"tile": 32.0}, marks=pytest.mark.xfail(
-                reason="a merged tile of 128 m has steps of 2 mm: the farthest off is 1.5 mm",
-            ),
-        ),
+        (120.0, {"tile": 32.0}),
+        (56.0, {"tile": 14.0, "near": 1}),
         (120.0, {"tile": 32.0, "plain": True}),
         (4000.0, {"tile": 1000.0, "near": 1, "plain": True}),
     ],
