@@ -402,7 +402,10 @@ def tiles_command(
     species: Annotated[
         Path,
         typer.Option(
-            "--species", help="Folder of plants, converted or models.", metavar="FOLDER", parser=_path
+            "--species",
+            help="Folder of plants, converted or models.",
+            metavar="FOLDER",
+            parser=_path,
         ),
     ],
     out: Out,

@@ -109,7 +109,7 @@ def test_a_plain_group_is_read_back_to_single_precision(tmp_path: Path) -> None:
 
 def test_a_quantised_group_says_that_it_is_one() -> None:
     """Clients that cannot must refuse it: what they would draw is 65535 m large."""
-    values = chunk(merged_glb(group(), SHEET, "t"))
+    values = chunk(merged_glb(group(size=48.0), SHEET, "t"))
     assert values["extensionsUsed"] == values["extensionsRequired"] == ["KHR_mesh_quantization"]
     (primitive,) = values["meshes"][0]["primitives"]
     kinds = {
@@ -196,7 +196,7 @@ def test_the_material_is_the_sheets(tmp_path: Path) -> None:
 
 def test_a_moved_group_has_the_same_vertices_at_another_place() -> None:
     """By a power of two, which no number of these loses anything by."""
-    one = group()
+    one = group(size=48.0)
     exact = replace(one, positions=np.round(one.positions * 1024) / 1024)
     here, there = (
         merged_glb(replace(exact, positions=exact.positions + away), SHEET, "t")

@@ -63,6 +63,33 @@ def test_points_in_metres(tmp_path: Path) -> None:
     assert rows.notes[0].endswith("coordinates are no degrees, so they are taken as metres")
 
 
+@pytest.mark.parametrize(
+    ("name", "crs"),
+    [
+        ("urn:ogc:def:crs:OGC:1.3:CRS84", "OGC:CRS84"),
+        ("urn:ogc:def:crs:EPSG::4258", "EPSG:4258"),
+        ("EPSG:25832", "EPSG:25832"),
+        ("urn:ogc:def:crs:EPSG:6.9:25832", "EPSG:25832"),
+        ("my own", None),
+    ],
+)
+def test_maps(tmp_path: Path, name: str, crs: str | None) -> None:
+    """A file that names none has longitude and latitude."""
+    place = ([10.5, 53.5], {"species": "ash"})
+    named = {"type": "name", "properties": {"name": name}}
+    found = read(tmp_path, collection(place, crs=named)).columns
+    assert found.crs == crs and found.geographic == (crs in ("OGC:CRS84", "EPSG:4258"))
+    found = read(tmp_path, collection(place)).columns
+    assert found.crs == "OGC:CRS84" and found.geographic
+
+
+def test_chosen_columns_are_on_a_map_of_their_own(tmp_path: Path) -> None:
+    """What the format says of its coordinates says nothing of properties."""
+    place = ([10.5, 53.5], {"species": "ash", "rechts": 565_000, "hoch": 5_930_000})
+    rows = read(tmp_path, collection(place), 'columns = { x = "rechts", y = "hoch" }')
+    assert (rows.x[0], rows.columns.crs, rows.columns.geographic) == (565_000, None, False)
+
+
 def test_a_property_may_be_chosen_in_place_of_a_coordinate(tmp_path: Path) -> None:
     document = collection(([10.5, 53.5, 7.0], {"species": "ash", "ground": 99}))
     assert read(tmp_path, document).z[0] == 7
@@ -90,6 +117,18 @@ def test_a_property_may_be_chosen_in_place_of_a_coordinate(tmp_path: Path) -> No
         (
             collection(([1], {"species": "ash"})),
             "feature 1: expected two or three numbers as coordinates, found [1]; correct or remo",
+        ),
+        (
+            collection(([float("nan"), 2], {"species": "ash"})),
+            "feature 1, column coordinates[0]: expected a number, found nan; correct or remove",
+        ),
+        (
+            collection(([1, float("inf")], {"species": "ash"})),
+            "feature 1, column coordinates[1]: expected a number, found inf; correct or remove",
+        ),
+        (
+            collection(([10**400, 2], {"species": "ash"})),
+            "feature 1, column coordinates[0]: expected a number, found 1000000",
         ),
         (
             {"features": [{"geometry": {"type": "Polygon", "coordinates": []}}]},

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vegtool.tiles.projection import Zone, zone_at, zone_of
+from vegtool.tiles.projection import Zone, is_degrees, is_world, same_map, zone_at, zone_of
 
 PROJ = [
     ("EPSG:32632", 10.0, 53.5, 566331.5281877273, 5928359.088260288),
@@ -39,6 +39,84 @@ def test_across_the_date_line() -> None:
     zone = Zone(1, False)
     east, north = zone.project(np.array([179.9, -180.1]), np.array([10.0, 10.0]))
     assert (east[0], north[0]) == pytest.approx((east[1], north[1]), abs=1e-6)
+
+
+@pytest.mark.parametrize(("crs", "longitude", "latitude", "east", "north"), PROJ)
+def test_and_back(crs: str, longitude: float, latitude: float, east: float, north: float) -> None:
+    zone = zone_of(crs)
+    assert zone is not None
+    found = zone.unproject(np.array([east]), np.array([north]))
+    assert found == (pytest.approx([longitude], abs=1e-11), pytest.approx([latitude], abs=1e-11))
+
+
+def places(zone: Zone, count: int = 200) -> tuple[np.ndarray, np.ndarray]:
+    """All over a zone and as far again on either side, to where UTM ends."""
+    rng = np.random.default_rng(zone.number)
+    latitude = rng.uniform(0, 80 if zone.south else 84, count) * (-1 if zone.south else 1)
+    longitude = zone.meridian + rng.uniform(-6, 6, count)
+    return (longitude + 180) % 360 - 180, latitude
+
+
+ZONES = [Zone(32, False), Zone(33, True), Zone(1, False), Zone(60, True)]
+
+
+@pytest.mark.parametrize("zone", ZONES)
+def test_there_and_back_is_where_it_was(zone: Zone) -> None:
+    """Within half a micrometre, of the 111 km that a degree has; across the date line too."""
+    longitude, latitude = places(zone)
+    found = zone.unproject(*zone.project(longitude, latitude))
+    np.testing.assert_allclose(found, (longitude, latitude), rtol=0, atol=5e-12)
+
+
+@pytest.mark.parametrize("zone", ZONES)
+def test_proj_agrees_to_a_micrometre(zone: Zone) -> None:
+    """Both ways; of its degrees, a hundred billionth is a micrometre."""
+    warp = pytest.importorskip("rasterio.warp", reason="the extra [geo] is not installed")
+    longitude, latitude = places(zone)
+    wanted = warp.transform("EPSG:4326", zone.crs, longitude, latitude)
+    np.testing.assert_allclose(zone.project(longitude, latitude), wanted, rtol=0, atol=1e-6)
+    east, north = (np.array(values) for values in wanted)
+    back = warp.transform(zone.crs, "EPSG:4326", east, north)
+    np.testing.assert_allclose(zone.unproject(east, north), back, rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("zone", ZONES)
+def test_convergence_and_scale_are_what_differences_of_proj_say(zone: Zone) -> None:
+    """Of places one and two steps to the map's north, to the fourth order of the step: its error is
+    (500 m / 6,400 km)^4, and that of rounding a nanometre over a step."""
+    warp = pytest.importorskip("rasterio.warp", reason="the extra [geo] is not installed")
+    longitude, latitude = places(zone)
+    east, north = zone.project(longitude, latitude)
+    radians = np.zeros((2, len(east)))
+    for times, weight in ((-2, 1), (-1, -8), (1, 8), (2, -1)):
+        found = np.array(warp.transform(zone.crs, "EPSG:4326", east, north + 500.0 * times))
+        away = (found - (longitude, latitude) + 180) % 360 - 180
+        radians += np.radians(away) * weight / (12 * 500.0)
+    flat = 1 - 0.0066943799901413165 * np.sin(np.radians(latitude)) ** 2  # e squared, of WGS 84
+    to_east = radians[0] * np.cos(np.radians(latitude)) * 6_378_137 / np.sqrt(flat)
+    to_north = radians[1] * 6_378_137 * (1 - 0.0066943799901413165) / flat**1.5
+    convergence, scale = zone.distortion(longitude, latitude)
+    np.testing.assert_allclose(convergence, np.arctan2(to_east, to_north), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(scale, 1 / np.hypot(to_east, to_north), rtol=0, atol=1e-9)
+
+
+def test_the_central_meridian_points_north() -> None:
+    """At 0.9996; east of it the map's north is east of north, in the south west of it."""
+    convergence, scale = Zone(32, False).distortion(np.array([9.0, 11.0]), np.array([50.0, 50.0]))
+    assert convergence[0] == 0 and scale[0] == pytest.approx(0.9996, abs=1e-12)
+    assert convergence[1] == pytest.approx(np.radians(2) * np.sin(np.radians(50)), rel=1e-3)
+    assert Zone(32, True).distortion(np.array([11.0]), np.array([-50.0]))[0] < 0
+
+
+def test_maps_of_other_names() -> None:
+    """EPSG:26923 is the last zone of NAD83; 26929 is Alabama's, 25827 nobody's."""
+    assert zone_of("EPSG:26923") == Zone(23, False)
+    assert zone_of("EPSG:26929") is zone_of("EPSG:25827") is zone_of("EPSG:25860") is None
+    assert same_map("EPSG:25832", "epsg:32632") and not same_map("EPSG:25832", "EPSG:32732")
+    assert same_map("EPSG:4258", "OGC:CRS84") and not same_map("EPSG:4326", "EPSG:32632")
+    assert same_map("epsg:2154", "EPSG:2154") and not same_map("EPSG:2154", "EPSG:2056")
+    assert is_world("epsg:4326") and not is_world("EPSG:32632") and not is_world(None)
+    assert is_degrees(-180, 84) and not is_degrees(10, 85) and not is_degrees(565_000, 50)
 
 
 def test_zones_of_places_and_names() -> None:

@@ -22,7 +22,10 @@ from vegtool.lod import Triangles
 
 QUANTIZATION, INSTANCING = "KHR_mesh_quantization", "EXT_mesh_gpu_instancing"
 STEPS = 65535
-"""Of 16 bits: a tile of 64 m has vertices to half a millimetre."""
+"""Of 16 bits."""
+LARGEST_STEP_M = 1e-3
+"""Metres: where steps of 16 bits would be larger, that is in tiles of more than 65 m, positions are
+floats, so that plants stay where they are beside each other."""
 SHORT_INDICES = 65535
 """Vertices; index 65535 itself is reserved for primitive restart."""
 LINEAR, LINEAR_MIPMAP_LINEAR, CLAMP_TO_EDGE = 9729, 9987, 33071
@@ -121,7 +124,10 @@ def _quantized(
     normals want it."""
     low, high = group.positions.min(axis=0), group.positions.max(axis=0)
     step = float((high - low).max()) / STEPS or 1.0
-    positions = np.rint((group.positions - low) / step).astype(np.uint16)
+    placed = {"translation": low.tolist(), "scale": [step] * 3}
+    positions: npt.NDArray[Any] = np.rint((group.positions - low) / step).astype(np.uint16)
+    if step > LARGEST_STEP_M:
+        positions, placed = group.positions.astype(np.float32), {}
     attributes = {
         "POSITION": document.add_accessor(positions, bounds=True),
         "NORMAL": document.add_accessor(_bytes(group.normals), normalized=True),
@@ -130,7 +136,6 @@ def _quantized(
         attributes["TANGENT"] = document.add_accessor(_bytes(group.tangents), normalized=True)
     uvs = np.rint(np.clip(group.uvs, 0, 1) * STEPS).astype(np.uint16)
     attributes["TEXCOORD_0"] = document.add_accessor(uvs, normalized=True)
-    placed = {"translation": low.tolist(), "scale": [step] * 3}
     return attributes | _colors(document, group), placed
 
 

@@ -100,6 +100,7 @@ class Row:
     foot: FloatArray
     tile_m: float
     origin: FloatArray = field(default_factory=lambda: np.zeros(3))
+    crs: str | None = None
     notes: tuple[str, ...] = ()
 
     @property

@@ -36,12 +36,15 @@ WITHOUT_UNIT = ("species",)
 @dataclass(frozen=True)
 class Columns:
     """number: of the column with each meaning. factor: its unit in metres or radians.
-    geographic: whether x and y are longitude and latitude. ignored: names of the others."""
+    geographic: whether x and y are longitude and latitude. ignored: names of the others. crs: of x
+    and y, where the file says it. notes: sentences on what was guessed."""
 
     number: Mapping[str, int]
     factor: Mapping[str, float]
     geographic: bool
     ignored: tuple[str, ...]
+    crs: str | None = None
+    notes: tuple[str, ...] = ()
 
 
 def columns_of(table: Table, scene: Scene) -> Columns:
@@ -53,7 +56,8 @@ def columns_of(table: Table, scene: Scene) -> Columns:
     column that is not there, for two that mean the same, and for want of an x or a y.
     """
     chosen = _chosen(table, scene)
-    number = dict(table.given) | chosen
+    given, notes = _given(table, chosen)
+    number = given | chosen
     for meaning in ALIASES:
         if meaning not in number:
             found = [i for i, name in enumerate(table.names) if _meaning(name) == meaning]
@@ -75,11 +79,32 @@ def columns_of(table: Table, scene: Scene) -> Columns:
             )
     _check_units(scene)
     factor = {meaning: _factor(table, scene, meaning, i) for meaning, i in number.items()}
-    by_name = all(_plain(table.names[number[axis]])[0] in DEGREES for axis in NEEDED)
-    geographic = by_name if table.geographic is None else table.geographic
+    of_format = all(number[axis] == table.given.get(axis) for axis in NEEDED)
+    geographic = table.geographic if of_format else None
+    if geographic is None:
+        geographic = all(_plain(table.names[number[axis]])[0] in DEGREES for axis in NEEDED)
     used = {i for meaning, i in number.items() if meaning != "crown"}
     ignored = tuple(name for i, name in enumerate(table.names) if i not in used and name)
-    return Columns(number, factor, geographic, ignored)
+    crs = table.crs if of_format else None
+    return Columns(number, factor, geographic, ignored, crs, notes)
+
+
+def _given(table: Table, chosen: Mapping[str, int]) -> tuple[dict[str, int], tuple[str, ...]]:
+    """What the format says. Of the tree tops that lidR finds (locate_trees), z is how high they are
+    above the ground, and stands in a column Z too."""
+    given, tops = dict(table.given), "Z"
+    if (
+        not {"treeID", tops} <= set(table.names)
+        or "z" not in given
+        or {"z", "height"} & set(chosen)
+    ):
+        return given, ()
+    del given["z"]
+    given["height"] = table.names.index(tops)
+    return given, (
+        f"{table.path}: treeID and Z are those of tree tops that lidR finds, so Z is the height of "
+        "the trees; columns in [placement] may say otherwise",
+    )
 
 
 def _chosen(table: Table, scene: Scene) -> dict[str, int]:

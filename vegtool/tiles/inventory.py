@@ -18,15 +18,21 @@ from vegtool.scene import Scene
 from vegtool.tiles.hashing import draws, hashes, key
 from vegtool.tiles.order import spread_order
 from vegtool.tiles.placement import LongArray, Plants, Tiles
-from vegtool.tiles.projection import NORTHERN, SOUTHERN, zone_at, zone_of
+from vegtool.tiles.projection import (
+    NORTHERN,
+    SOUTHERN,
+    is_degrees,
+    is_world,
+    same_map,
+    zone_at,
+    zone_of,
+)
 from vegtool.tiles.rows import Rows, read_rows
 from vegtool.tiles.terrain import Terrain
 from vegtool.tiles.variation import DRAWS, heights, tints, yaws
 
 FAR_M = 100_000.0
 """Metres: coordinates beyond are a map's, others may be the scene's own."""
-WORLD = ("EPSG:4326", "EPSG:4258", "OGC:CRS84")
-"""Coordinate reference systems of longitude and latitude."""
 HALF = 2**30
 """Tiles on either side of the origin."""
 
@@ -51,6 +57,7 @@ class Inventory:
     tint: SingleArray
     row: LongArray
     notes: tuple[str, ...] = ()
+    crs: str | None = None
 
     def tallest(self, count: int) -> FloatArray:
         """(count,) metres that no plant of each species is taller than; NaN: the model's own."""
@@ -79,7 +86,7 @@ def place(scene: Scene, terrain: Terrain, tile_m: float, progress: Progress) -> 
     rows = read_rows(scene)
     progress("placement", 0.5)
     notes = list(rows.notes)
-    east, north, origin = _on_the_map(scene, terrain, rows, notes)
+    east, north, origin, crs = _on_the_map(scene, terrain, rows, notes)
     xz = np.stack([east - origin[0], origin[1] - north], axis=1)
     on = terrain.inside(xz)
     if not on.all():
@@ -108,40 +115,82 @@ def place(scene: Scene, terrain: Terrain, tile_m: float, progress: Progress) -> 
         tints(random)[order],
         rows.row[order],
         tuple(notes),
+        crs,
     )
 
 
 def _on_the_map(
     scene: Scene, terrain: Terrain, rows: Rows, notes: list[str]
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """(n,) metres east and north on the map, and (3,) what of it is the scene's origin."""
-    crs = terrain.crs
-    world = crs is not None and crs.upper() in WORLD
-    origin = terrain.origin
-    if not (rows.columns.geographic or world):
-        return rows.x, rows.y, _origin(scene, terrain, rows, rows.x, rows.y, notes)
-    middle = [(values.min() + values.max()) / 2 for values in (rows.x, rows.y)]
-    in_degrees = crs is None or world
-    if in_degrees and origin is not None:
-        middle = [float(origin[0]), float(origin[1])]
-    zone = zone_at(*middle) if in_degrees else zone_of(str(crs))
-    if zone is None:
-        raise UsageError(
-            f"{rows.table.path}: has longitude and latitude, and the ground is in {crs}; expected "
-            "a UTM zone, such as EPSG:25832; project the inventory, for example with ogr2ogr "
-            f"-t_srs {crs}"
-        )
+) -> tuple[FloatArray, FloatArray, FloatArray, str | None]:
+    """(n,) metres east and north on the map, (3,) what of it is the scene's origin, and which map
+    that is."""
+    _check_map(terrain, rows)
+    said_world = is_world(scene.terrain.crs)
+    if not (rows.columns.geographic or (said_world and rows.columns.crs is None)):
+        origin = _origin(scene, terrain, rows, rows.x, rows.y, notes)
+        if origin is None:
+            return rows.x, rows.y, np.zeros(3), None
+        return rows.x, rows.y, origin, terrain.crs or rows.columns.crs
+    crs, origin = terrain.crs, terrain.origin
+    if crs is None or is_world(crs):
+        place = [(values.min() + values.max()) / 2 for values in (rows.x, rows.y)]
+        if origin is not None:
+            place = _degrees(scene, rows, origin)
+        zone = zone_at(*place)
+        if origin is not None:
+            east, north = zone.project(*(np.array([value]) for value in place))
+            origin = np.array([east[0], north[0], 0.0])
+        crs = zone.crs
+    else:
+        found = zone_of(crs)
+        if found is None:
+            raise UsageError(
+                f"{rows.table.path}: has longitude and latitude, and the ground is in {crs}; "
+                "expected a UTM zone, such as EPSG:25832; project the inventory, for example with "
+                f"ogr2ogr -t_srs {crs}"
+            )
+        zone = found
     _check_degrees(rows)
-    if in_degrees:
+    if said_world or terrain.crs is None:
         notes.append(
-            f"{rows.table.path}: longitude and latitude became metres in {zone.crs}, UTM zone "
+            f"{rows.table.path}: longitude and latitude became metres in {crs}, UTM zone "
             f"{zone.number}"
         )
     east, north = zone.project(rows.x, rows.y)
-    if in_degrees and origin is not None:
-        there = zone.project(*(np.array([value]) for value in middle))
-        return east, north, np.array([there[0][0], there[1][0], 0.0])
-    return east, north, _origin(scene, terrain, rows, east, north, notes)
+    if origin is None:
+        origin = _origin(scene, terrain, rows, east, north, notes)
+    return east, north, np.zeros(3) if origin is None else origin, crs
+
+
+def _check_map(terrain: Terrain, rows: Rows) -> None:
+    """Raise InputError for an inventory on another map than the ground, or on none that is known
+    here."""
+    found, said = rows.columns.crs, terrain.crs
+    if found is None:
+        return
+    if rows.columns.geographic:
+        if not is_world(found):
+            raise InputError(
+                f"{rows.table.path}: expected longitude and latitude on WGS 84, ETRS89 or NAD83, "
+                f"found {found:.60}; reproject it, for example with ogr2ogr -t_srs EPSG:4326"
+            )
+    elif said is not None and not same_map(found, said):
+        raise InputError(
+            f"{rows.table.path}: expected {said:.60}, as the ground, found {found:.60}; reproject "
+            f"it, for example with ogr2ogr -t_srs, or correct crs in [terrain]"
+        )
+
+
+def _degrees(scene: Scene, rows: Rows, origin: FloatArray) -> list[float]:
+    """The origin of a scene that names no map, as longitude and latitude."""
+    place = [float(origin[0]), float(origin[1])]
+    if not is_degrees(*place):
+        raise UsageError(
+            f"{scene.at('terrain', 'origin')}: origin: expected degrees, as {rows.table.path} has "
+            f"longitude and latitude; got {place[0]:.15g}, {place[1]:.15g}; say crs in [terrain], "
+            "the map that it is on"
+        )
+    return place
 
 
 def _check_degrees(rows: Rows) -> None:
@@ -168,13 +217,13 @@ def _origin(
     east: FloatArray,
     north: FloatArray,
     notes: list[str],
-) -> FloatArray:
-    """(3,) the scene's origin on the map: as the ground says; else the map's own, unless it is so
-    far away that the middle of the inventory must be meant."""
+) -> FloatArray | None:
+    """(3,) the scene's origin on the map: as the ground says; else the middle of the inventory,
+    where that is far away; None where coordinates may be the scene's own."""
     if terrain.origin is not None:
         return terrain.origin
     if max(abs(east).max(), abs(north).max()) <= FAR_M:
-        return np.zeros(3)
+        return None
     middle = [round((values.min() + values.max()) / 2) for values in (east, north)]
     said = f"origin = [{middle[0]}, {middle[1]}]"
     if terrain.kind == "heightmap":

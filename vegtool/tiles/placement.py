@@ -124,6 +124,11 @@ class Placement(Protocol):
         to get the scene's frame, x = east, y = up, z = -north; zeros if nothing was."""
 
     @property
+    def crs(self) -> str | None:
+        """The coordinate reference system of `origin`, such as EPSG:25832; None where that is no
+        place on a map that is known."""
+
+    @property
     def tiles(self) -> Tiles:
         """Where there are plants, and how many."""
 

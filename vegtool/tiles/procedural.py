@@ -66,6 +66,11 @@ class Procedural:
     terrain: Terrain
     notes: tuple[str, ...] = ()
 
+    @property
+    def crs(self) -> str | None:
+        """The coordinate reference system of `origin`."""
+        return None if self.terrain.origin is None else self.terrain.crs
+
     def tallest(self, count: int) -> FloatArray:
         """(count,) metres that no plant of each species is taller than; NaN: the model's own."""
         limits = [table.height_m for table in self.rules.tables[:count]]

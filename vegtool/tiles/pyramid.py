@@ -19,6 +19,7 @@ from vegtool.errors import UsageError
 from vegtool.lod import Display
 from vegtool.progress import Progress, silent
 from vegtool.scene import Scene
+from vegtool.tiles.georeference import earth_from_scene, notes_on
 from vegtool.tiles.levels import level_at, switches, triangles
 from vegtool.tiles.library import Species
 from vegtool.tiles.options import TileOptions
@@ -49,14 +50,15 @@ class Pyramid:
     tree: Quadtree
     options: TileOptions
     display: Display
-    crs: str | None = None
     notes: tuple[str, ...] = ()
     _digests: dict[tuple[int, int], str] = field(default_factory=dict, repr=False)
 
-    @property
+    @cached_property
     def placed(self) -> FloatArray | None:
         """(4, 4) from the scene's frame, z up, to the earth's; None where it has no place there."""
-        return None
+        tiles = self.placement.tiles
+        middle = float(tiles.low[:, 1].min() + tiles.high[:, 1].max()) / 2
+        return earth_from_scene(self.placement.crs, self.placement.origin, middle)
 
     @cached_property
     def switch_m(self) -> FloatArray:
@@ -174,8 +176,8 @@ def pyramid_of(
     found = prepare(scene, placement, library, workers, lambda s, f: progress(s, (1 + f) / 2))
     placement = found.placement
     tree = quadtree_of(placement.tiles, placement.tile_m, _above(placement, options))
-    notes = (*terrain.notes, *placement.notes, *found.notes)
-    return Pyramid(placement, found.species, tree, options, Display(), terrain.crs, notes)
+    notes = (*terrain.notes, *placement.notes, *notes_on(terrain, placement), *found.notes)
+    return Pyramid(placement, found.species, tree, options, Display(), notes)
 
 
 def _above(placement: Placement, options: TileOptions) -> int:

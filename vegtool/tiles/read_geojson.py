@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from vegtool.errors import InputError
+from vegtool.tiles.projection import is_world
 from vegtool.tiles.table import Part, Table, Value
 
 COORDINATES = {"x": "coordinates[0]", "y": "coordinates[1]", "z": "coordinates[2]"}
 """What the axes of a position are called in messages."""
-WORLD = ("crs84", "4326")
-"""In the names of coordinate systems of longitude and latitude."""
+STANDARD = "OGC:CRS84"
+"""The coordinate system of files that name none."""
+CODE = re.compile(r"EPSG:(?:[\w.]*:)?(\d+)", re.IGNORECASE)
+"""In the names of others, such as urn:ogc:def:crs:EPSG::25832."""
 
 
 def read(path: Path) -> Table:
@@ -52,18 +56,22 @@ def read(path: Path) -> Table:
         yield tuple(columns)
 
     notes: tuple[str, ...] = ()
-    geographic = _is_geographic(document)
-    if geographic and any(abs(x) > 180 or abs(y) > 90 for x, y, *_ in points):
-        geographic = False
+    crs = _crs(document)
+    if is_world(crs) and any(abs(x) > 180 or abs(y) > 90 for x, y, *_ in points):
+        crs = None
         notes = (f"{path}: coordinates are no degrees, so they are taken as metres",)
     return Table(
-        path, names, parts, lambda row: f"feature {row:,}", given, geographic, False, notes
+        path, names, parts, lambda row: f"feature {row:,}", given, is_world(crs), False, notes, crs
     )
 
 
-def _is_geographic(document: dict[str, Any]) -> bool:
-    crs = document.get("crs")
-    return crs is None or any(name in json.dumps(crs).casefold() for name in WORLD)
+def _crs(document: dict[str, Any]) -> str | None:
+    """The coordinate system of a document; None where its name is not known."""
+    said = json.dumps(document.get("crs"))
+    if said == "null" or "CRS84" in said.upper():
+        return STANDARD
+    match = CODE.search(said)
+    return f"EPSG:{match[1]}" if match else None
 
 
 def _coordinates(path: Path, row: int, feature: Any) -> list[float]:

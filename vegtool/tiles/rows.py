@@ -20,6 +20,9 @@ READERS = {
     ".txt": "vegtool.tiles.read_csv",
     ".geojson": "vegtool.tiles.read_geojson",
     ".json": "vegtool.tiles.read_geojson",
+    ".gpkg": "vegtool.tiles.read_gpkg",
+    ".las": "vegtool.tiles.read_las",
+    ".laz": "vegtool.tiles.read_las",
 }
 """File name extension -> module whose `read(path)` gives a Table."""
 
@@ -83,7 +86,7 @@ def read_rows(scene: Scene) -> Rows:
     if first == 1:
         raise InputError(f"{table.path}: expected a row for each plant, found none; add some")
     whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    notes = [*table.notes]
+    notes = [*table.notes, *columns.notes]
     nothing = int(np.count_nonzero(whole["height"] == 0))
     if nothing:
         whole["height"][whole["height"] == 0] = np.nan

@@ -11,7 +11,7 @@ from vegtool.tiles.library import MANIFEST
 from vegtool.tiles.named import TABLES, library_at
 from vegtool.tiles.species import folder_of
 
-INVENTORIES = (".csv", ".tsv", ".txt", ".json", ".geojson")
+INVENTORIES = (".csv", ".tsv", ".txt", ".json", ".geojson", ".gpkg", ".las", ".laz")
 """Extensions of files with a row per plant."""
 
 

@@ -26,6 +26,7 @@ class Table:
     values, so many rows at a time. place: says where a row is, for messages.
     given: what a column means, where the format itself says so. geographic: whether x and y are
     longitude and latitude, where the format says so. decimal_comma: whether 1,5 is a number.
+    crs: the coordinate reference system of x and y, such as EPSG:25832, where the file says so.
     notes: sentences on what was guessed; to be shown to the user.
     """
 
@@ -37,6 +38,7 @@ class Table:
     geographic: bool | None = None
     decimal_comma: bool = False
     notes: tuple[str, ...] = ()
+    crs: str | None = None
 
     def numbers(self, values: Sequence[Value], column: str, row: int, needed: bool) -> FloatArray:
         """(n,) float64; NaN where nothing is known and nothing needed.
@@ -74,8 +76,8 @@ class Table:
     ) -> InputError:
         """What is said of a value that cannot be."""
         what = f"{found!r:.60}" if isinstance(found, str) and found.strip() else "nothing"
-        if isinstance(found, float | int):
-            what = f"{found:.15g}"
+        if isinstance(found, float | int):  # whole numbers may be more than a float can be
+            what = f"{found:.15g}" if abs(found) < 1e300 else f"{found!s:.60}"
         return InputError(
             f"{self.path}, {self.place(row)}, column {column}: expected {expected}, found {what}; "
             f"{remedy or 'correct or remove the row'}"

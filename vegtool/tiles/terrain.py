@@ -11,8 +11,10 @@ import numpy as np
 from vegtool.arrays import FloatArray, IntArray, checked, unit
 from vegtool.errors import InputError, UsageError
 from vegtool.scene import Scene
+from vegtool.tiles.georeference import check_crs
 from vegtool.tiles.grey import read_grey
 from vegtool.tiles.grid import Grid
+from vegtool.tiles.projection import is_degrees, is_world, zone_at, zone_of
 
 GEOTIFF = (".tif", ".tiff")
 """Extensions of heightmaps that know their own size and place."""
@@ -32,7 +34,8 @@ class Terrain:
     base: metres, the height of a plane.
     origin: (3,) float64 metres east, north and up: the map's coordinates of the scene's origin;
     None where it has no place on the map.
-    crs: the map's coordinate reference system, such as EPSG:25832, where it is known.
+    crs: the map's coordinate reference system, such as EPSG:25832, where it is known; of longitude
+    and latitude only where there is no origin.
     notes: sentences on what was guessed; to be shown to the user.
     """
 
@@ -117,12 +120,15 @@ def terrain_of(scene: Scene) -> Terrain:
     plane where an extent is, else none.
 
     A PNG's black and white are the two heights of `height_m`, its outermost pixels lie on the
-    border of `extent_m`, its first row is the northern one. A GeoTIFF says all that itself.
+    border of `extent_m`, its first row is the northern one. A GeoTIFF says all that itself. An
+    origin in degrees is put on the map of its UTM zone.
     Raises UsageError, with file and line, for a table that says too little or contradicts itself,
     InputError for a file that is missing, broken or of another size, CapabilityError for a GeoTIFF
     where rasterio is not installed.
     """
     table = scene.terrain
+    if table.crs is not None:
+        check_crs(table.crs, f"{scene.at('terrain', 'crs')}: crs")
     guess: Kind = "heightmap" if table.heightmap else "plane" if table.extent_m else "none"
     kind = table.kind or guess
     if kind == "heightmap":
@@ -137,13 +143,30 @@ def terrain_of(scene: Scene) -> Terrain:
             f"ground that is {kind}; got {low:g} and {high:g}"
         )
     extent = None if table.extent_m is None else np.array(table.extent_m, dtype=np.float64)
-    return Terrain(kind, extent, None, low, _origin(scene), table.crs)
+    return Terrain(kind, extent, None, low, *_place(scene))
 
 
-def _origin(scene: Scene) -> FloatArray | None:
-    """Of the scene on the map, as the file says."""
-    pair = scene.terrain.origin
-    return None if pair is None else np.array([*pair, 0.0])
+def _place(scene: Scene) -> tuple[FloatArray | None, str | None]:
+    """Origin and crs of the scene on the map, as the file says."""
+    pair, crs = scene.terrain.origin, scene.terrain.crs
+    if pair is None:
+        return None, crs
+    at = f"{scene.at('terrain', 'origin')}: origin"
+    if is_world(crs):
+        if not is_degrees(*pair):
+            raise UsageError(
+                f"{at}: expected degrees of longitude and latitude, as crs is {crs}; got "
+                f"{pair[0]:.15g}, {pair[1]:.15g}; give crs the map that it is on"
+            )
+        zone = zone_at(*pair)
+        east, north = zone.project(*(np.array([value], np.float64) for value in pair))
+        return np.array([east[0], north[0], 0.0]), zone.crs
+    if crs is not None and zone_of(crs) is not None and is_degrees(*pair):
+        raise UsageError(
+            f"{at}: expected metres east and north, as crs is {crs}; got {pair[0]:.15g}, "
+            f'{pair[1]:.15g}, which look like degrees; project them, or say crs = "EPSG:4326"'
+        )
+    return np.array([*pair, 0.0], np.float64), crs
 
 
 def _from_picture(scene: Scene, path: Path) -> Terrain:
@@ -171,7 +194,7 @@ def _from_picture(scene: Scene, path: Path) -> Terrain:
             f"{path}: {grey.size} over {extent[0]:g} x {extent[1]:g} m are not square: "
             f"{grid.step[0]:.3g} x {grid.step[1]:.3g} m"
         )
-    return Terrain("heightmap", extent, grid, 0.0, _origin(scene), table.crs, tuple(notes))
+    return Terrain("heightmap", extent, grid, 0.0, *_place(scene), tuple(notes))
 
 
 def _from_geotiff(scene: Scene, path: Path) -> Terrain:
