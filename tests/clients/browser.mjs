@@ -8,22 +8,32 @@ import {folder, load} from './packages.mjs';
 const page = `<!doctype html>
 <script type="importmap">
   {"imports": {"three": "/packages/three/build/three.module.js",
-               "three/addons/": "/packages/three/examples/jsm/"}}
+               "three/addons/": "/packages/three/examples/jsm/",
+               "3d-tiles-renderer/three": "/packages/3d-tiles-renderer/build/index.three.js"}}
 </script>
 <script type="module" src="/page.js"></script>`;
-const types = {'.js': 'text/javascript', '.html': 'text/html', '.glb': 'model/gltf-binary'};
+const types = {
+  '.js': 'text/javascript', '.html': 'text/html', '.glb': 'model/gltf-binary',
+  '.gltf': 'model/gltf+json', '.json': 'application/json', '.png': 'image/png',
+};
 
 // Opens a page that runs `script` (a module that sets window.ready) and serves files[i] at
-// /file/i; calls work(tab, complaints), with what the page complains of, and closes everything.
+// /file/i, and what is below it, where it is a folder, at /file/i/...; calls work(tab, complaints,
+// asked), with what the page complains of and the paths that the server is asked for, and closes
+// everything. What is in folders may be kept by the browser, as a server of tiles allows it.
 export async function inBrowser(script, files, work) {
+  const asked = [];
   const server = http.createServer((request, response) => {
     const url = decodeURIComponent(request.url.split('?')[0]);
     const send = (type, body) => response.setHeader('content-type', type).end(body);
+    asked.push(url);
     if (url === '/') return send('text/html', page);
     if (url === '/favicon.ico') return response.writeHead(204).end();
     if (url === '/page.js') return send('text/javascript', script);
-    const index = url.match(/^\/file\/(\d+)$/);
-    const file = index ? files[index[1]] : path.join(folder, url.replace(/^\/packages\//, ''));
+    const [, index, below] = url.match(/^\/file\/(\d+)(\/.*)?$/) ?? [];
+    const file = index
+      ? path.join(files[index], below ?? '') : path.join(folder, url.replace(/^\/packages\//, ''));
+    if (below) response.setHeader('cache-control', 'max-age=3600');
     fs.readFile(file, (error, body) => {
       if (error) return response.writeHead(404).end();
       return send(types[path.extname(file)] || 'application/octet-stream', body);
@@ -52,7 +62,7 @@ export async function inBrowser(script, files, work) {
     });
     await tab.goto(`http://127.0.0.1:${server.address().port}/`);
     await tab.waitForFunction('window.ready', {timeout: 60_000});
-    await work(tab, complaints);
+    await work(tab, complaints, asked);
   } finally {
     await browser.close();
     server.close();

@@ -4,12 +4,11 @@
 //   light: strengths as factors of the albedo. sun: towards it. fov: degrees, of the full image,
 //   of which a crop is drawn; pixels, from the upper left.
 // stdout: one JSON object per line and job, {file, complaints}. The picture of a view is written to
-//   the file `out`: RGBA as half floats, lowest row first, linear and premultiplied.
-// Materials keep their textures, factors, cutoff and sides, and become Lambert's; where `stock` is
-// true they stay as three's own loader makes them. Pictures are multisampled (4x) in half-float
-// linear light, as three's own effect composer draws them.
+//   the file `out`, as linear_light.mjs makes it.
+// Materials become Lambert's; where `stock` is true they stay as three's own loader makes them.
 import fs from 'node:fs';
 import {inBrowser} from './browser.mjs';
+import {inLinearLight} from './linear_light.mjs';
 import {readInput} from './packages.mjs';
 
 const {light, jobs} = await readInput();
@@ -18,22 +17,8 @@ const script = `
 import * as THREE from 'three';
 import {GLTFLoader} from 'three/addons/loaders/GLTFLoader.js';
 
-const light = ${JSON.stringify(light)};
-const ANISOTROPY = 4, SAMPLES = 4;
-const renderer = new THREE.WebGLRenderer({alpha: true, antialias: false});
-renderer.setClearColor(0x000000, 0);
-// Lambert's law divides the albedo by pi
-const gray = (value) => new THREE.Color(value, value, value).multiplyScalar(Math.PI);
-const sun = new THREE.DirectionalLight(gray(light.sun), 1);
-const sky = new THREE.HemisphereLight(gray(light.above), gray(light.below), 1);
+${inLinearLight(light)}
 let scene;
-
-function lambert(old) {
-  const {map, normalMap, normalScale, alphaTest, side, color, vertexColors} = old;
-  for (const texture of [map, normalMap]) if (texture) texture.anisotropy = ANISOTROPY;
-  return new THREE.MeshLambertMaterial(
-    {map, normalMap, normalScale, alphaTest, side, color, vertexColors});
-}
 
 window.open3 = async (url, stock) => {
   scene?.traverse((node) => {
@@ -58,20 +43,7 @@ window.shoot = (view) => {
   camera.position.set(...view.eye);
   camera.up.set(...view.up);
   camera.lookAt(...view.target);
-  sun.position.set(...view.sun);
-  const target = new THREE.WebGLRenderTarget(
-    width, height, {type: THREE.HalfFloatType, samples: SAMPLES});
-  renderer.setRenderTarget(target);
-  renderer.clear();
-  renderer.render(scene, camera);
-  const pixels = new Uint16Array(4 * width * height);
-  renderer.readRenderTargetPixels(target, 0, 0, width, height, pixels);
-  target.dispose();
-  const bytes = new Uint8Array(pixels.buffer), parts = [];
-  for (let i = 0; i < bytes.length; i += 8192) {
-    parts.push(String.fromCharCode(...bytes.subarray(i, i + 8192)));
-  }
-  return btoa(parts.join(''));
+  return picture(scene, camera, view.sun, width, height);
 };
 window.ready = true;
 `;

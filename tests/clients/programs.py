@@ -28,7 +28,7 @@ def missing() -> str | None:
     """What is not here that the checks need."""
     if shutil.which("node") is None:
         return "needs Node.js"
-    if not (PACKAGES / "three").is_dir():
+    if not all((PACKAGES / name).is_dir() for name in ("three", "3d-tiles-renderer")):
         return "needs npm packages: tests/clients/run installs them"
     if BROWSER is None:
         return "needs Chromium"

@@ -139,7 +139,8 @@ def _written(source: Path, outcome: dict[str, Any]) -> Written:
 def validated(written: dict[str, Written]) -> dict[Path, dict[str, Any]]:
     """The validator's word on every file."""
     files = [str(file) for each in written.values() for file in each.files]
-    return {Path(answer["file"]): answer for answer in node("validate.mjs", files)}
+    answers = node("validate.mjs", {"files": files, "alone": True})
+    return {Path(answer["file"]): answer for answer in answers}
 
 
 @pytest.fixture(scope="session")
