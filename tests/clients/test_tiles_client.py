@@ -25,6 +25,7 @@ import pytest
 from cards import cards
 from programs import MARKS, node
 from scipy.optimize import linprog
+from shared_models import shared_model
 
 from vegtool.arrays import FloatArray, Picture
 from vegtool.cli import run
@@ -32,8 +33,7 @@ from vegtool.convert import ConvertOptions, convert
 from vegtool.formats.gltf import write_chain
 from vegtool.formats.gltf_data import open_gltf
 from vegtool.formats.gltf_tile import INSTANCING, Instances, instanced_glb
-from vegtool.formats.shared_model import shared_model
-from vegtool.formats.tileset import TileEntry, tileset_json
+from vegtool.formats.tileset import TILESET, TileEntry, tileset_files
 from vegtool.growth import sample
 from vegtool.lighting.light import Light
 from vegtool.lod import Display
@@ -205,10 +205,12 @@ def tinted(folder: Path) -> None:
     instances = Instances(model, places, np.zeros(3), np.ones(3), TINTS)
     (folder / "inner" / "cards.glb").write_bytes(instanced_glb([instances], "cards"))
     bounds = np.array([[-2.0, -1, -1], [2, 1, 1]])
-    inner = tileset_json(TileEntry("cards.glb", np.zeros(3), bounds, 0.0), None)
-    (folder / "inner" / "inner.json").write_bytes(inner)
-    outer = tileset_json(TileEntry("inner/inner.json", np.zeros(3), bounds, 1.0), None)
-    (folder / "tileset.json").write_bytes(outer)
+    for file, content, error in (
+        (folder / "inner" / "inner.json", "cards.glb", 0.0),
+        (folder / TILESET, "inner/inner.json", 1.0),
+    ):
+        root = TileEntry(content, np.zeros(3), bounds, error)
+        file.write_bytes(tileset_files(root, None)[TILESET])
 
 
 def draws(file: Path) -> int:
