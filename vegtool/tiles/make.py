@@ -63,9 +63,7 @@ def chosen(pyramid: Pyramid, shared: Shared, node: Node, stand: Stand) -> Chosen
 
     def at(times: float, of_level: FloatArray) -> Chosen:
         away = times * pyramid.made_for_m(height)
-        level, more = fitting(
-            stand, pyramid.switch_m, of_level, away, most, pyramid.finest(height)
-        )
+        level, more = fitting(stand, pyramid.switch_m, of_level, away, most, pyramid.finest(height))
         return Chosen(level, times * more)
 
     if near:
