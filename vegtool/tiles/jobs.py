@@ -323,7 +323,9 @@ def _far(world: World, job: FarJob) -> Iterator[Outcome]:
         return
     with timed(seconds, "quarters"):
         read = [(one, read_plant(world.out / file_of(one))) for one, _ in quarters]
-    tile = reclustered_tile(pyramid, node, read, sum(e.facts["plants"] for _, e in quarters))
+    plants = sum(entry.facts["plants"] for _, entry in quarters)
+    below_m = max(entry.facts["error_m"] or 0.0 for _, entry in quarters)
+    tile = reclustered_tile(pyramid, node, read, plants, below_m)
     yield _written(world, replace(tile, seconds={**seconds, **tile.seconds}), key)
 
 

@@ -95,8 +95,9 @@ def instanced_tile(
             )
         data = instanced_glb(drawn, str(node))
     triangles = int(pyramid.of_level[stand.species, level].sum())
+    error = error_of(pyramid, stand, level)
     draws = sum(len(one.model.objects["meshes"][0]["primitives"]) for one in drawn)
-    return Tile(node, data, "instances", len(stand), triangles, draws, 0.0, seconds=seconds)
+    return Tile(node, data, "instances", len(stand), triangles, draws, error, seconds=seconds)
 
 
 def merged_tile(
@@ -110,13 +111,26 @@ def merged_tile(
         group = merged(stand, part, sheet.sheet.parts, pyramid.origin(node))
     with timed(seconds, "writing"):
         data = merged_glb(group, sheet.files, str(node), pyramid.options.plain)
-    return Tile(node, data, "merged", len(stand), len(group.indices) // 3, 1, seconds=seconds)
+    error = error_of(pyramid, stand, level)
+    triangles = len(group.indices) // 3
+    return Tile(node, data, "merged", len(stand), triangles, 1, error, seconds=seconds)
+
+
+def error_of(pyramid: Pyramid, stand: Stand, level: IntArray) -> float | None:
+    """Metres: the largest error of a plant as its level draws it; None where none is known."""
+    error = pyramid.level_error_m[stand.species, level] * stand.scale
+    return None if np.isnan(error).all() else float(np.nanmax(error))
 
 
 def reclustered_tile(
-    pyramid: Pyramid, node: Node, quarters: Sequence[tuple[Node, Plant]], plants: int
+    pyramid: Pyramid,
+    node: Node,
+    quarters: Sequence[tuple[Node, Plant]],
+    plants: int,
+    below_m: float = 0.0,
 ) -> Tile:
     """What stands for the quarters, given as a client loads them, on which are so many plants.
+    below_m: how far these are off already.
 
     Raises CapabilityError where nothing can draw.
     """
@@ -129,7 +143,7 @@ def reclustered_tile(
     group = group_of([plant for _, plant in quarters], places, str(node))
     away = pyramid.from_m(tree.height(node.level)) + SEEN_FROM * tree.side(node.level)
     level = reclustered(group, pyramid.budget(node), away, pyramid.display, options.max_texture)
-    error = None if level.geometric_error_m is None else level.geometric_error_m[1]
+    error = below_m + (0.0 if level.geometric_error_m is None else level.geometric_error_m[1])
     return Tile(
         node, level_glb(level, str(node)), "reclustered", plants, level.triangles, 1, error,
         client_plant(level).bounds + origin, dict(level.seconds),
