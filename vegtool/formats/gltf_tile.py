@@ -17,6 +17,13 @@ import numpy.typing as npt
 from vegtool.arrays import FloatArray
 from vegtool.formats.glb import ELEMENT_ARRAY_BUFFER, Document
 from vegtool.formats.gltf_material import UNLIT
+from vegtool.formats.plant_table import (
+    PlantTable,
+    add_tables,
+    of_instances,
+    of_vertices,
+    vertex_ids,
+)
 from vegtool.formats.shared_model import SharedModel
 from vegtool.lod import Triangles
 
@@ -44,10 +51,22 @@ class SheetFiles:
     unlit: bool = False
 
 
-def merged_glb(group: Triangles, sheet: SheetFiles, name: str, plain: bool = False) -> bytes:
+@dataclass(frozen=True, eq=False)
+class GroupPlants:
+    """The plants of a merged group: what is known of each, and (v,) int64 which of them each vertex
+    is of."""
+
+    table: PlantTable
+    of_vertex: npt.NDArray[np.int64]
+
+
+def merged_glb(
+    group: Triangles, sheet: SheetFiles, name: str, plain: bool = False,
+    plants: GroupPlants | None = None,
+) -> bytes:  # fmt: skip
     """A merged group: one node, one mesh, one primitive, one material.
 
-    plain: float32 in place of KHR_mesh_quantization.
+    plain: float32 in place of KHR_mesh_quantization. plants: for clients that ask which is which.
     """
     document = Document()
     with_tangents = sheet.normal is not None
@@ -58,10 +77,16 @@ def merged_glb(group: Triangles, sheet: SheetFiles, name: str, plain: bool = Fal
         attributes, placed = _quantized(document, group, with_tangents)
         document.use_extension(QUANTIZATION, required=True)
     kind = np.uint16 if len(group.positions) <= SHORT_INDICES else np.uint32
+    more: dict[str, Any] = {}
+    if plants is not None:
+        add_tables(document, [plants.table])
+        attributes["_FEATURE_ID_0"] = document.add_accessor(vertex_ids(plants.of_vertex))
+        more["extensions"] = of_vertices(document, 0, len(plants.table))
     primitive = {
         "attributes": attributes,
         "indices": document.add_accessor(group.indices.astype(kind), ELEMENT_ARRAY_BUFFER),
         "material": _material(document, sheet, name),
+        **more,
     }
     mesh = document.add("meshes", name=name, primitives=[primitive])
     document.show(document.add("nodes", name=name, mesh=mesh, **placed))
@@ -71,23 +96,29 @@ def merged_glb(group: Triangles, sheet: SheetFiles, name: str, plain: bool = Fal
 @dataclass(frozen=True, eq=False)
 class Instances:
     """Plants that are drawn as one model. place: (n, 3) metres. yaw: (n,) radians about +y. scale:
-    (n,). tint: (n, 3) linear factors."""
+    (n,). tint: (n, 3) linear factors. plants: what is known of each, for clients that ask."""
 
     model: SharedModel
     place: FloatArray
     yaw: FloatArray
     scale: FloatArray
     tint: npt.NDArray[np.float32]
+    plants: PlantTable | None = None
 
 
 def instanced_glb(drawn: Sequence[Instances], name: str) -> bytes:
-    """Instances of shared models: a node and a mesh for each model. Raises ValueError for none."""
+    """Instances of shared models: a node and a mesh for each model. What is known of plants is
+    written where it is known of all. Raises ValueError for none."""
     if not drawn:
         raise ValueError("instanced_glb: expected instances")
     document = Document()
     document.use_extension(INSTANCING, required=True)
     nodes = []
-    for one in drawn:
+    tables = [one.plants for one in drawn if one.plants is not None]
+    with_plants = len(tables) == len(drawn)
+    if with_plants:
+        add_tables(document, tables)
+    for index, one in enumerate(drawn):
         half = one.yaw / 2
         rotation = np.zeros((len(half), 4), np.float32)
         rotation[:, 1], rotation[:, 3] = np.sin(half), np.cos(half)
@@ -100,7 +131,9 @@ def instanced_glb(drawn: Sequence[Instances], name: str) -> bytes:
         }
         attributes = {key: document.add_accessor(v, None) for key, v in values.items()}
         mesh = one.model.add_to(document)
-        extension = {INSTANCING: {"attributes": attributes}}
+        extension: dict[str, Any] = {INSTANCING: {"attributes": attributes}}
+        if with_plants:
+            extension |= of_instances(document, index, len(half))
         nodes.append(document.add("nodes", name=one.model.name, mesh=mesh, extensions=extension))
     document.show(document.add("nodes", name=name, children=nodes))
     return document.glb()

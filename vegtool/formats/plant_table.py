@@ -1,4 +1,4 @@
-"""What is known of each plant of a tile, for clients that ask: which it is, of what species, how high.
+"""What is known of each plant of a tile, for clients that ask: which, of what species, how high.
 
 Sources: EXT_structural_metadata (property tables, 3D Metadata Specification 1.0), EXT_mesh_features
 and EXT_instance_features (Cesium, OGC 22-025r4).

@@ -364,9 +364,11 @@ def _stand_key(world: World, node: Node, stand: Stand, how: Chosen) -> str:
         if near
         else [_sheet_key(world, height), repr(pyramid.options.plain)]
     )
+    names = [one.name for one in pyramid.species]
+    told = (stand.row, *names) if pyramid.options.attributes else ()
     return key_of(
         *drawn, stand.foot - pyramid.origin(node), stand.species, stand.scale, stand.yaw,
-        stand.tint, how.level,
+        stand.tint, how.level, *told,
     )  # fmt: skip
 
 

@@ -60,9 +60,9 @@ class Species:
     levels: the original, then coarser and coarser; a tuple, or Stored. switch_m: (n,) metres, from
     where each may be used, 0 for the original, in pictures in which a metre at a distance of one is
     `focal_px` pixels. fade: (n,) share of that distance along which it replaces the one before.
-    files: where each was read. error_m: (n,) metres, how far 95 % of each is from where the original
-    has it at most; NaN where nobody measured that. What is asked of all levels is read once, and
-    kept when a species goes to another process.
+    files: where each was read. error_m: (n,) metres, no more than which 95 % of each is from where
+    the original has it; NaN where nobody measured that. What is asked of all levels is read once,
+    and kept when a species goes to another process.
     """
 
     name: str

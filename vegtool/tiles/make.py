@@ -9,10 +9,11 @@ import numpy as np
 
 from vegtool.arrays import FloatArray, IntArray
 from vegtool.formats.gltf import level_glb
-from vegtool.formats.gltf_tile import Instances, instanced_glb, merged_glb
+from vegtool.formats.gltf_tile import GroupPlants, Instances, instanced_glb, merged_glb
+from vegtool.formats.plant_table import PlantTable
 from vegtool.plant import Plant
 from vegtool.tiles.levels import fitting
-from vegtool.tiles.merge import merged
+from vegtool.tiles.merge import merged, vertex_plants
 from vegtool.tiles.pyramid import Pyramid
 from vegtool.tiles.quadtree import Node
 from vegtool.tiles.shared import Shared
@@ -81,6 +82,7 @@ def instanced_tile(
             np.stack([stand.species, level], axis=1), axis=0, return_inverse=True
         )
         origin = pyramid.origin(node)
+        table = table_of(pyramid, stand)
         drawn = []
         for index, (kind, number) in enumerate(pair.tolist()):
             here = np.flatnonzero(which.ravel() == index)
@@ -91,6 +93,7 @@ def instanced_tile(
                     stand.yaw[here],
                     stand.scale[here],
                     stand.tint[here],
+                    None if table is None else table.only(here),
                 )
             )
         data = instanced_glb(drawn, str(node))
@@ -109,11 +112,25 @@ def merged_tile(
     with timed(seconds, "merging"):
         part = sheet.part[stand.species, level]
         group = merged(stand, part, sheet.sheet.parts, pyramid.origin(node))
+        table = table_of(pyramid, stand)
+        plants = None
+        if table is not None:
+            plants = GroupPlants(table, vertex_plants(part, sheet.sheet.parts))
     with timed(seconds, "writing"):
-        data = merged_glb(group, sheet.files, str(node), pyramid.options.plain)
+        data = merged_glb(group, sheet.files, str(node), pyramid.options.plain, plants)
     error = error_of(pyramid, stand, level)
     triangles = len(group.indices) // 3
     return Tile(node, data, "merged", len(stand), triangles, 1, error, seconds=seconds)
+
+
+def table_of(pyramid: Pyramid, stand: Stand) -> PlantTable | None:
+    """What is told of plants, where that is asked for."""
+    if not pyramid.options.attributes:
+        return None
+    own = np.array([one.height for one in pyramid.species])
+    height = (stand.scale * own[stand.species]).astype(np.float32)
+    names = tuple(one.name for one in pyramid.species)
+    return PlantTable(stand.row, stand.species, height, names)
 
 
 def error_of(pyramid: Pyramid, stand: Stand, level: IntArray) -> float | None:

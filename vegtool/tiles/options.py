@@ -31,6 +31,10 @@ class TileOptions:
     plain: bool = option(
         False, "Vertices of merged tiles as floats, for clients without KHR_mesh_quantization."
     )
+    attributes: bool = option(
+        False, "Write which plant is which, of what species and how high, for clients that ask "
+        "(EXT_structural_metadata)."
+    )  # fmt: skip
     max_texture: int = option(4096, "Largest side of a texture, in texels.", least=16, most=16384)
     format: str = option(
         "3dtiles",
