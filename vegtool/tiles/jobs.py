@@ -25,7 +25,7 @@ from vegtool.errors import (
 from vegtool.formats import read_plant
 from vegtool.progress import Progress, silent
 from vegtool.scene import Scene
-from vegtool.tiles.journal import Entry, key_of, write_file
+from vegtool.tiles.journal import Entry, Hashed, key_of, write_file
 from vegtool.tiles.make import (
     Chosen,
     Tile,
@@ -365,7 +365,7 @@ def _stand_key(world: World, node: Node, stand: Stand, how: Chosen) -> str:
         else [_sheet_key(world, height), repr(pyramid.options.plain)]
     )
     names = [one.name for one in pyramid.species]
-    told = (stand.row, *names) if pyramid.options.attributes else ()
+    told: list[Hashed] = [stand.row, *names] if pyramid.options.attributes else []
     return key_of(
         *drawn, stand.foot - pyramid.origin(node), stand.species, stand.scale, stand.yaw,
         stand.tint, how.level, *told,
