@@ -23,7 +23,7 @@ class TileOptions:
         "models that all tiles share; beyond, each tile is one mesh.", least=1, most=16,
     )  # fmt: skip
     triangles: int = option(
-        65_536, "Triangles of a merged tile, at most.", least=2, most=10_000_000
+        32_768, "Triangles of a merged tile, at most.", least=2, most=10_000_000
     )
     near_triangles: int = option(
         131_072, "Triangles of a tile of instances, at most.", least=2, most=1_000_000_000
