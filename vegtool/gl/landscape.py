@@ -117,8 +117,8 @@ class Landscape(OnGpu):
         mipmaps: bool = True,
         shared: Textures | None = None,
     ) -> int:
-        """Upload one more; returns its index, which no other gets. mipmaps: none for what is supersampled. shared: as of
-        PlantBuffers."""
+        """Upload one more; returns its index, which no other gets. mipmaps: none for what is
+        supersampled. shared: as of PlantBuffers."""
         self._plants[self._added] = InstancedPlant(
             plant, elements, mipmaps=mipmaps, shared=shared, ctx=self.ctx
         )

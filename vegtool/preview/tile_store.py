@@ -2,19 +2,20 @@
 
 Tiles are read when they are first drawn. What was drawn longest ago is forgotten first, and read
 again where it comes back. What tiles share stays for as long as any of them is there.
+
+Bytes are those of vertices, indices and textures on the GPU, and of what they were made of, which
+is kept beside them.
 """
 
 from __future__ import annotations
 
 import zlib
 from collections import Counter, OrderedDict
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any
 from weakref import WeakValueDictionary
 
-import moderngl
 import numpy as np
 
 from vegtool.elements import unordered
@@ -28,6 +29,9 @@ from vegtool.preview.tileset import Copies, Tileset, read_model, read_tile
 
 MOST_BYTES = 1 << 30
 """Bytes that are kept, on the GPU and beside it; more where what is drawn is more."""
+TEXEL_BYTES = 4
+Key = tuple[int, bool, float | None]
+"""Of a texture among Textures."""
 ALL_TEXELS = (2.0, 1.0, 1.0)
 """INSTANCE's `shown` of what does not fade."""
 
@@ -51,12 +55,13 @@ class Held:
 
 @dataclass(frozen=True, eq=False)
 class _Model:
-    """index: in the landscape. bytes: without textures. textures: that it is drawn with."""
+    """What tiles draw. index: in the landscape. bytes: without textures. textures: that it is drawn
+    with, each once."""
 
     index: int
     plant: Plant
     bytes: int
-    textures: tuple[moderngl.Texture, ...]
+    textures: tuple[Key, ...]
 
 
 class TileStore(OnGpu):
@@ -71,7 +76,7 @@ class TileStore(OnGpu):
         self._models: dict[Path, _Model] = {}
         self._users: Counter[Path] = Counter()
         self._textures: Textures = {}
-        self._shown: Counter[moderngl.Texture] = Counter()
+        self._shown: Counter[Key] = Counter()
         self._images: WeakValueDictionary[tuple[int, ...], Texture] = WeakValueDictionary()
 
     def __len__(self) -> int:
@@ -88,7 +93,7 @@ class TileStore(OnGpu):
     @property
     def texture_bytes(self) -> int:
         """On the GPU, mips counted."""
-        return sum(map(_texture_bytes, self._textures.values()))
+        return sum(TEXEL_BYTES * _with_mips(t.width * t.height) for t in self._textures.values())
 
     def held(self, tiles: Sequence[int]) -> list[Held]:
         """Tiles that are to be drawn now, in their order. Those drawn before last may be forgotten;
@@ -139,14 +144,16 @@ class TileStore(OnGpu):
         self.landscape.remove(model.index)
         self.bytes -= model.bytes
         self._shown.subtract(model.textures)
-        unseen = {one for one in model.textures if not self._shown[one]}
-        # their keys go with them: an id may be that of another image one day
-        for key in [key for key, one in self._textures.items() if one in unseen]:
-            del self._textures[key]
-        for texture in unseen:
-            del self._shown[texture]
-            self.bytes -= _both(texture)
-            texture.release()
+        for key in model.textures:
+            if not self._shown[key]:  # goes before its image, whose id may be another's one day
+                self.bytes -= self._both(key)
+                self._textures.pop(key).release()
+                del self._shown[key]
+
+    def _both(self, key: Key) -> int:
+        """Bytes of a texture and of the image that it was made of."""
+        texels = int(self._textures[key].width * self._textures[key].height)
+        return TEXEL_BYTES * (texels + _with_mips(texels))
 
     def _model(self, path: Path) -> Plant:
         """A model that tiles share, read once."""
@@ -158,12 +165,16 @@ class TileStore(OnGpu):
             plant = self._with_images(copies.plant)
             index = self.landscape.add(plant, unordered(plant), shared=self._textures)
             made = self.landscape.plants[-1]
-            model = _Model(index, plant, _model_bytes(made), tuple(_textures(made)))
+            model = _Model(index, plant, _model_bytes(made), self._textures_of(made))
             self.bytes += model.bytes
-            self.bytes += sum(_both(one) for one in model.textures if one not in self._shown)
+            self.bytes += sum(self._both(key) for key in model.textures if key not in self._shown)
             self._shown.update(model.textures)
             self._models[copies.file] = model
         return self._models[copies.file]
+
+    def _textures_of(self, made: InstancedPlant) -> tuple[Key, ...]:
+        maps = {m for g in made.buffers.groups for m in (g.color_map, g.normal_map, g.light_map)}
+        return tuple(key for key, texture in self._textures.items() if texture in maps)
 
     def _with_images(self, plant: Plant) -> Plant:
         """The same, with the images of another where they are the same bytes."""
@@ -187,19 +198,8 @@ class TileStore(OnGpu):
         return replace(plant, materials=materials)
 
 
-def _textures(made: InstancedPlant) -> Iterable[moderngl.Texture]:
-    """Each once."""
-    maps = [(g.color_map, g.normal_map, g.light_map) for g in made.buffers.groups]
-    return dict.fromkeys(one for group in maps for one in group if one is not None)
-
-
-def _texture_bytes(texture: moderngl.Texture) -> int:
-    return 4 * texture.width * texture.height * 4 // 3
-
-
-def _both(texture: moderngl.Texture) -> int:
-    """Of a texture and of the image that it was made of."""
-    return _texture_bytes(texture) + 4 * texture.width * texture.height
+def _with_mips(texels: int) -> int:
+    return texels * 4 // 3
 
 
 def _model_bytes(made: InstancedPlant) -> int:

@@ -43,9 +43,9 @@ class Tileset:
     place on the earth, in that of its root.
 
     file: path of each; None of a tile without content, in whose place its children are drawn.
-    origin: (t, 3) metres. low, high: (t, 3) metres, of their boxes. error_m: (t,). children: (t, 2) int64,
-    the first of each, and the one after the last. plants: (t,) int64, that stand on each. feet_m:
-    (t, 2), the lowest and highest of their feet. depth: (t,) int64, of each below the root.
+    origin: (t, 3) metres. low, high: (t, 3) metres, of their boxes. error_m: (t,). children: (t, 2)
+    int64, the first of each, and the one after the last. plants: (t,) int64, that stand on each.
+    feet_m: (t, 2), the lowest and highest of their feet. depth: (t,) int64, of each below the root.
     """
 
     file: tuple[str | None, ...]  # half a million paths would take seconds
