@@ -421,8 +421,8 @@ def held_bytes(store: TileStore) -> int:
     models = sum(model.bytes for model in store._models.values())
     assert {key for model in store._models.values() for key in model.textures} == {*store._textures}
     assert len(store._models) == len(store.landscape.plants)
-    texels = [t.width * t.height for t in store._textures.values()]
-    return rows + models + sum(4 * (count + count * 4 // 3) for count in texels)  # images and mips
+    images = [4 * t.width * t.height for t in store._textures.values()]
+    return rows + models + sum(image + image * 4 // 3 for image in images)  # and mips
 
 
 def walked(folder: Path, most: int, monkeypatch: pytest.MonkeyPatch) -> tuple[list[Any], list[int]]:

@@ -93,7 +93,7 @@ class TileStore(OnGpu):
     @property
     def texture_bytes(self) -> int:
         """On the GPU, mips counted."""
-        return sum(TEXEL_BYTES * _with_mips(t.width * t.height) for t in self._textures.values())
+        return sum(_with_mips(TEXEL_BYTES * t.width * t.height) for t in self._textures.values())
 
     def held(self, tiles: Sequence[int]) -> list[Held]:
         """Tiles that are to be drawn now, in their order. Those drawn before last may be forgotten;
@@ -152,8 +152,8 @@ class TileStore(OnGpu):
 
     def _both(self, key: Key) -> int:
         """Bytes of a texture and of the image that it was made of."""
-        texels = int(self._textures[key].width * self._textures[key].height)
-        return TEXEL_BYTES * (texels + _with_mips(texels))
+        image = TEXEL_BYTES * int(self._textures[key].width * self._textures[key].height)
+        return image + _with_mips(image)
 
     def _model(self, path: Path) -> Plant:
         """A model that tiles share, read once."""
@@ -198,8 +198,8 @@ class TileStore(OnGpu):
         return replace(plant, materials=materials)
 
 
-def _with_mips(texels: int) -> int:
-    return texels * 4 // 3
+def _with_mips(image_bytes: int) -> int:
+    return image_bytes * 4 // 3
 
 
 def _model_bytes(made: InstancedPlant) -> int:
