@@ -355,6 +355,7 @@ def twice(values: dict[str, Any]) -> None:
 OUTSIDE: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
     "one that is not there": (refer("tiles/x.json"), "expected the tileset .*x.json, found none"),
     "a folder": (refer("tiles/folder.json"), "folder.json: cannot be read"),
+    "a NUL in a name": (refer("tiles/a\0b.json"), "expected a tileset as vegtool tiles writes it"),
     "itself": (refer("tileset.json"), "expected a tileset that no other refers to, and not it"),
     "itself, by another name": (refer("tiles/../tileset.json"), "no other refers to, and not its"),
     "one twice": (twice, "expected a tileset that no other refers to, and not itself, found .*2_0"),

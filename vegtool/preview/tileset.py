@@ -102,17 +102,16 @@ def read_tileset(file: Path) -> Tileset:
     """
     parts: list[_Part] = []
     outside = [_Outside(file, None, 0, (0.0, 0.0, 0.0), 0)]
-    met, count = {file.resolve()}, 1
+    met: set[Path] = set()
+    count = 1
     for one in outside:  # which grows; a file's tiles are let go before the next is read
         part = _part(one, count)
-        for other in part.outside:
-            resolved = other.file.resolve()
-            if resolved in met:
-                raise InputError(
-                    f"{one.file}: expected a tileset that no other refers to, and not itself, "
-                    f"found {other.file}. Make the tiles again"
-                )
-            met.add(resolved)
+        if one.file.resolve() in met:
+            raise InputError(
+                f"{one.by}: expected a tileset that no other refers to, and not itself, "
+                f"found {one.file}. Make the tiles again"
+            )
+        met.add(one.file.resolve())
         outside += part.outside
         parts.append(part)
         count = max(count, part.end)
