@@ -3,22 +3,26 @@ import fs from 'node:fs';
 import http from 'node:http';
 import os from 'node:os';
 import path from 'node:path';
+import {fileURLToPath} from 'node:url';
 import {folder, load} from './packages.mjs';
 
 const page = `<!doctype html>
 <script type="importmap">
   {"imports": {"three": "/packages/three/build/three.module.js",
                "three/addons/": "/packages/three/examples/jsm/",
-               "3d-tiles-renderer/three": "/packages/3d-tiles-renderer/build/index.three.js"}}
+               "3d-tiles-renderer/three": "/packages/3d-tiles-renderer/build/index.three.js",
+               "vegtool/": "/ours/"}}
 </script>
 <script type="module" src="/page.js"></script>`;
+const ours = fileURLToPath(new URL('../../docs/clients', import.meta.url));
 const types = {
   '.js': 'text/javascript', '.html': 'text/html', '.glb': 'model/gltf-binary',
   '.gltf': 'model/gltf+json', '.json': 'application/json', '.png': 'image/png',
 };
 
 // Opens a page that runs `script` (a module that sets window.ready) and serves files[i] at
-// /file/i, and what is below it, where it is a folder, at /file/i/...; calls work(tab, complaints,
+// /file/i, and what is below it, where it is a folder, at /file/i/...; what docs/clients has can be
+// imported from vegtool/. Calls work(tab, complaints,
 // asked), with what the page complains of and the paths that the server is asked for, and closes
 // everything. What is in folders may be kept by the browser, as a server of tiles allows it.
 export async function inBrowser(script, files, work) {
@@ -31,8 +35,10 @@ export async function inBrowser(script, files, work) {
     if (url === '/favicon.ico') return response.writeHead(204).end();
     if (url === '/page.js') return send('text/javascript', script);
     const [, index, below] = url.match(/^\/file\/(\d+)(\/.*)?$/) ?? [];
+    const own = url.match(/^\/ours(\/.*)/)?.[1];
     const file = index
-      ? path.join(files[index], below ?? '') : path.join(folder, url.replace(/^\/packages\//, ''));
+      ? path.join(files[index], below ?? '')
+      : own ? path.join(ours, own) : path.join(folder, url.replace(/^\/packages\//, ''));
     if (below) response.setHeader('cache-control', 'max-age=3600');
     fs.readFile(file, (error, body) => {
       if (error) return response.writeHead(404).end();

@@ -35,7 +35,7 @@ from vegtool.tiles.make import (
     reclustered_tile,
 )
 from vegtool.tiles.options import TileOptions
-from vegtool.tiles.pyramid import Pyramid, pyramid_of, used_levels
+from vegtool.tiles.pyramid import Pyramid, pyramid_of
 from vegtool.tiles.quadtree import Node, Quadtree
 from vegtool.tiles.shared import FOLDER, Shared
 from vegtool.tiles.source import scene_at
@@ -229,7 +229,10 @@ def _failed(name: str, error: Exception) -> Failed:
 
 def _model(world: World, job: ModelJob) -> Iterator[Outcome]:
     name, shared = name_of(job), world.shared
-    key = key_of(shared.model_name(job.kind, job.level), world.pyramid.digest(job.kind, job.level))
+    key = key_of(
+        shared.model_name(job.kind, job.level), world.pyramid.digest(job.kind, job.level),
+        world.pyramid.options.near_texture,
+    )  # fmt: skip
     yield _shared(world, job, name, key, lambda: shared.model_files(job.kind, job.level))
 
 
@@ -378,6 +381,6 @@ def _drawn(stand: Stand, how: Chosen) -> list[tuple[int, int]]:
 
 
 def _sheet_key(world: World, height: int) -> str:
-    levels = used_levels(world.pyramid, height)
+    levels = world.shared.levels(height)
     digests = [world.pyramid.digest(kind, level) for kind, level in levels]
     return key_of(height, world.pyramid.options.max_texture, repr(levels), *digests)

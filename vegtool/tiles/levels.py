@@ -19,6 +19,9 @@ from vegtool.tiles.stand import Stand
 
 STEP = 2**0.125
 """Ratio of the distances that are tried."""
+COARSEST = 2.0
+"""Where plants would have to be drawn as if they were so many times farther away than they are,
+their quarters' billboards are clustered anew."""
 TRIES = 96
 """Of them: to 3,756 times the distance."""
 

@@ -12,7 +12,7 @@ from vegtool.formats.gltf import level_glb
 from vegtool.formats.gltf_tile import GroupPlants, Instances, instanced_glb, merged_glb
 from vegtool.formats.plant_table import PlantTable
 from vegtool.plant import Plant
-from vegtool.tiles.levels import fitting
+from vegtool.tiles.levels import COARSEST, fitting
 from vegtool.tiles.merge import merged, vertex_plants
 from vegtool.tiles.pyramid import Pyramid
 from vegtool.tiles.quadtree import Node
@@ -20,9 +20,6 @@ from vegtool.tiles.shared import Shared
 from vegtool.tiles.stand import Stand
 from vegtool.timing import timed
 
-COARSEST = 2.0
-"""Where plants would have to be drawn as if they were so many times farther away than they are,
-their quarters' billboards are clustered anew."""
 SEEN_FROM = 0.25
 """Of its side, how much nearer a square's edge is than its middle, where it is looked at."""
 
@@ -63,13 +60,22 @@ def chosen(pyramid: Pyramid, shared: Shared, node: Node, stand: Stand) -> Chosen
     """What the plants on a square are drawn as: one plant at least."""
     height = pyramid.tree.height(node.level)
     near = pyramid.instanced(height)
-    of_level = pyramid.of_level if near else shared.sheet(height).triangles
     most = pyramid.options.near_triangles if near else pyramid.budget(node)
-    found = fitting(
-        stand, pyramid.switch_m, of_level, pyramid.made_for_m(height), most,
-        pyramid.finest(height),
-    )  # fmt: skip
-    return Chosen(*found)
+
+    def at(times: float, of_level: FloatArray) -> Chosen:
+        away = times * pyramid.made_for_m(height)
+        level, more = fitting(
+            stand, pyramid.switch_m, of_level, away, most, pyramid.finest(height)
+        )
+        return Chosen(level, times * more)
+
+    if near:
+        return at(1.0, pyramid.of_level)
+    if height > pyramid.options.near:
+        found = at(1.0, pyramid.of_level)
+        if found.too_coarse:  # as most are: then nobody needs a sheet
+            return found
+    return at(shared.crowded(height), shared.sheet(height).triangles)
 
 
 def instanced_tile(

@@ -28,6 +28,10 @@ class TileOptions:
     near_triangles: int = option(
         131_072, "Triangles of a tile of instances, at most.", least=2, most=1_000_000_000
     )
+    near_texture: int = option(
+        256, "Largest side of a texture of those models, in texels: clients keep a copy of it for "
+        "every tile that shows it.", least=16, most=16384,
+    )  # fmt: skip
     plain: bool = option(
         False, "Vertices of merged tiles as floats, for clients without KHR_mesh_quantization."
     )

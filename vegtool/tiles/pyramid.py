@@ -153,14 +153,16 @@ class Pyramid:
             found[1] = np.maximum(found[1], [aside, high[1], aside])
         return found
 
-    def finest_at(self, height: int) -> list[int]:
-        """The finest level of each species that a square of that height may show."""
+    def finest_at(self, height: int, times: float = 1.0) -> list[int]:
+        """The finest level of each species that a square of that height may show, from so many
+        times as far away as it may be seen."""
         count = len(self.species)
         each = Stand(
             np.zeros((count, 3)), np.arange(count, dtype=np.int32), self.largest, np.zeros(count),
             np.ones((count, 3), np.float32), np.arange(count), np.zeros(count, np.int64),
         )  # fmt: skip
-        found = level_at(each, self.switch_m, self.made_for_m(height), self.finest(height))
+        away = self.made_for_m(height) * times
+        found = level_at(each, self.switch_m, away, self.finest(height))
         return [int(level) for level in found]
 
 
@@ -198,10 +200,11 @@ def _above(placement: Placement, options: TileOptions) -> int:
     return max(0, ceil(log(wanted / HANDFUL, 4)))
 
 
-def used_levels(pyramid: Pyramid, height: int) -> list[tuple[int, int]]:
-    """Species and levels that squares of that height may show, in order."""
+def used_levels(pyramid: Pyramid, height: int, times: float = 1.0) -> list[tuple[int, int]]:
+    """Species and levels that squares of that height may show from so many times as far away, in
+    order."""
     return [
         (kind, level)
-        for kind, finest in enumerate(pyramid.finest_at(height))
+        for kind, finest in enumerate(pyramid.finest_at(height, times))
         for level in range(finest, len(pyramid.species[kind].levels))
     ]

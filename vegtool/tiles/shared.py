@@ -18,8 +18,11 @@ from vegtool.arrays import FloatArray, IntArray
 from vegtool.formats import png
 from vegtool.formats.gltf_tile import SheetFiles
 from vegtool.formats.shared_model import SharedModel, model_files, plain_name, read_shared
+from vegtool.tiles.levels import COARSEST, fitting
 from vegtool.tiles.pyramid import Pyramid, used_levels
+from vegtool.tiles.quadtree import Node
 from vegtool.tiles.sheet import Sheet, sheet_of
+from vegtool.tiles.textures import limited
 
 FOLDER = "shared"
 """In that of the tiles: readers that keep to a file's own folder find it too."""
@@ -48,6 +51,7 @@ class Shared:
         self.pyramid, self.folder = pyramid, folder
         self._models: dict[tuple[int, int], SharedModel] = {}
         self._sheets: dict[int, MergedSheet] = {}
+        self._crowded: dict[int, float] = {}
 
     @cached_property
     def _names(self) -> list[str]:
@@ -59,7 +63,9 @@ class Shared:
 
     def model_files(self, kind: int, level: int) -> dict[str, bytes]:
         """A level's files, by their names in FOLDER."""
-        plant = self.pyramid.species[kind].levels[level]
+        plant = limited(
+            self.pyramid.species[kind].levels[level], self.pyramid.options.near_texture
+        )
         return model_files(plant, self.model_name(kind, level))
 
     def model(self, kind: int, level: int) -> SharedModel:
@@ -68,6 +74,18 @@ class Shared:
             file = self.folder / FOLDER / f"{plain_name(self.model_name(kind, level))}.gltf"
             self._models[kind, level] = read_shared(file, f"{FOLDER}/")
         return self._models[kind, level]
+
+    def crowded(self, height: int) -> float:
+        """How many times farther away than they are the plants of merged squares of a height are
+        drawn as, at least: as on the square of the middle density they have to be. Finer levels
+        would only take room on the sheet, of which clients keep a copy for every square."""
+        if height not in self._crowded:
+            self._crowded[height] = self._crowded_on(self._middle(height), height)
+        return self._crowded[height]
+
+    def levels(self, height: int) -> list[tuple[int, int]]:
+        """Species and levels that the sheet of a height has, in order."""
+        return used_levels(self.pyramid, height, self.crowded(height))
 
     def sheet(self, height: int) -> MergedSheet:
         """What merged squares of a height are drawn with."""
@@ -84,7 +102,7 @@ class Shared:
         return files
 
     def _sheet_of(self, height: int) -> MergedSheet:
-        pairs = used_levels(self.pyramid, height)
+        pairs = self.levels(height)
         levels = [self.pyramid.species[kind].levels[level] for kind, level in pairs]
         sheet = sheet_of(levels, self.pyramid.options.max_texture)
         part = np.full(self.pyramid.of_level.shape, -1, np.int32)
@@ -93,6 +111,22 @@ class Shared:
         normal = f"{stem}_normal.png" if sheet.with_normals else None
         named = SheetFiles(f"{stem}_color.png", normal, sheet.double_sided, sheet.unlit)
         return MergedSheet(sheet, named, part)
+
+    def _middle(self, height: int) -> Node:
+        """The square of a height with more plants to each tile on it than half of the others."""
+        tree, count = self.pyramid.tree, self.pyramid.placement.tiles.count
+        nodes = tree.nodes(tree.depth - height)
+        ordered = sorted(nodes, key=lambda node: (count[tree.tiles_of(node)].mean(), node))
+        return ordered[len(ordered) // 2]
+
+    def _crowded_on(self, node: Node, height: int) -> float:
+        pyramid = self.pyramid
+        _, times = fitting(
+            pyramid.stand(node), pyramid.switch_m, pyramid.of_level, pyramid.made_for_m(height),
+            pyramid.budget(node), pyramid.finest(height),
+        )  # fmt: skip
+        # Beyond the blocks, squares that are more crowded are clustered anew, and need no sheet.
+        return times if height <= pyramid.options.near else min(times, COARSEST)
 
 
 def file_names(names: Sequence[str]) -> list[str]:
