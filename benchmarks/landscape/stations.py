@@ -47,17 +47,19 @@ class Station:
     def eye(self, plants_side_m: float) -> Eye:
         """On a landscape of a side of so many metres: distances to it are the same."""
         x, y, z = self.position
-        beyond = plants_side_m / 2 if self.name in ("far", "middle") else 0.0
+        beyond = plants_side_m / 2 if self.name in ("near", "middle", "far") else 0.0
         return Eye(np.array([x, y, z + beyond]), self.yaw_deg, self.pitch_deg, FOV_DEG)
 
 
 STATIONS = (
-    Station("near", (3.0, 1.7, 5.0), 20.0, 0.0, 0.15),
+    Station("near", (0.0, 1.7, 3.0), 0.0, 0.0, 0.15),
+    Station("in a branch", (3.0, 1.7, 5.0), 20.0, 0.0, 0.15),
     Station("middle", (10.0, 25.0, 120.0), 0.0, -8.0, 0.10),
     Station("far", (0.0, 120.0, 700.0), 0.0, -10.0, 0.10),
     Station("above", (0.0, 250.0, 150.0), 0.0, -60.0, 0.10),
 )
-"""A walker between the plants; one on a hill 120 m before them; one 700 m away; one above."""
+"""A walker 3 m before the plants; one between them, whose eye is in a conifer's branch; one on a hill
+120 m before them; one 700 m away; one above."""
 
 
 @dataclass(frozen=True)
