@@ -3,8 +3,8 @@
 //         most, shares, stations: [{eye, target, fov, near, far, sun: [x, y, z], out}, ...]},
 //         ...]}
 //   error: pixels, of a tile that may be drawn, not its children. folder: with a tileset.json; what
-//   it names is served from there. most: bytes that the client allows itself; null: as it has it,
-//   0.4 GB. shares: whether it has the plugin of docs/clients/shared_textures.js. Stations are flown to one after the other, and each waited at
+//   it names is served from there. most: bytes that the client allows itself, of which it
+//   then keeps none for what is out of sight; null: as it has it, 0.4 GB. shares: whether it has the plugin of docs/clients/shared_textures.js. Stations are flown to one after the other, and each waited at
 //   until nothing more is loaded. light, fov, sun: as of draw_in_three.mjs, y up.
 // stdout: one JSON object per visit,
 //   {folder, stations: [{drawn, calls, refused, bytes, textures}, ...], failed, asked, complaints}
@@ -39,8 +39,9 @@ window.visit = (folder, most, shares) => {
   failed = [];
   tiles = new TilesRenderer(folder + 'tileset.json');
   tiles.errorTarget = ${error};
-  usual ??= tiles.lruCache.maxBytesSize;  // of a cache that all tilesets of a page have
-  tiles.lruCache.maxBytesSize = most ?? usual;
+  const cache = tiles.lruCache;  // which all tilesets of a page have
+  usual ??= [cache.minBytesSize, cache.maxBytesSize];
+  [cache.minBytesSize, cache.maxBytesSize] = most ? [0, most] : usual;
   if (shares) tiles.registerPlugin(new SharedTextures());
   tiles.addEventListener('load-error', ({url, error}) => failed.push([fileOf(url), error.message]));
   tiles.addEventListener('load-model', ({scene: model}) => model.traverse((node) => {

@@ -20,7 +20,7 @@ from vegtool.preview.stock import Stock, stocked
 from vegtool.preview.world import World
 from vegtool.seeding import generator
 from vegtool.tiles.library import Species
-from vegtool.tiles.placement import Plants, Tiles
+from vegtool.tiles.placement import BoolArray, Plants, Tiles
 from vegtool.tiles.terrain import Terrain
 
 FOCAL_PX = 300.0
@@ -148,6 +148,10 @@ class Garden:
         for of in self.given:
             np.fmax.at(found, of.species, of.height)
         return found
+
+    def measured(self, count: int) -> BoolArray:
+        without = [of.species[np.isnan(of.height)] for of in self.given]
+        return ~np.isin(np.arange(count), np.concatenate(without))
 
     def plants(self, tile: int, most: int | None = None) -> Plants:
         self.asked.append(tile)

@@ -124,6 +124,7 @@ def test_the_tallest_of_each_kind_is_known_before_any_tile_is_asked_for(tmp_path
     placement = inventory(tmp_path, rows, "x,y,species,height")
     assert len(placement.tiles) > 1
     np.testing.assert_array_equal(placement.tallest(3), [12.5, np.nan, np.nan])
+    assert placement.measured(3).tolist() == [False, False, True]
     without = inventory(tmp_path, ["1,1,ash", "2,2,pine"])
     assert np.isnan(without.tallest(2)).all()
 

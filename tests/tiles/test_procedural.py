@@ -174,13 +174,14 @@ def test_the_tallest_of_each_kind_is_the_greatest_height_that_it_may_have(tmp_pa
     """In the order of the scene's kinds, and no plant is taller; NaN where it says no height."""
     placement = plain(tmp_path)
     limits = placement.tallest(2)
-    assert limits.tolist() == [20, 0.4]
+    assert limits.tolist() == [20, 0.4] and placement.measured(2).all()
     found = together(placement)
     for kind, limit in enumerate(limits):
         tall = found["height"][found["species"] == kind]
         assert 0.99 * limit < tall.max() <= limit * (1 + 1e-6)
     text = PLAIN.format(width=400, depth=400, spacing=3).replace("height_m = [10, 20]\n", "")
     np.testing.assert_array_equal(placed(tmp_path, text).tallest(2), [np.nan, 0.4])
+    assert placed(tmp_path, text).measured(2).tolist() == [False, True]
 
 
 def test_bounds_hold_all_plants_and_no_fewer(tmp_path: Path) -> None:

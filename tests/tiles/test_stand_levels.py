@@ -59,6 +59,9 @@ class Wood:
     def tallest(self, count: int) -> np.ndarray:
         return np.full(count, np.nan)
 
+    def measured(self, count: int) -> np.ndarray:
+        return np.zeros(count, bool)
+
     def plants(self, tile: int, most: int | None = None) -> Plants:
         return self.given[tile]
 

@@ -298,9 +298,10 @@ def test_a_square_shows_no_level_that_is_not_at_hand(written: Written) -> None:
     made, folder, _ = written
     shared = Shared(made, folder / TILES)
     for height in range(made.tree.depth + 1):
-        pairs = used_levels(made, height)
+        near = made.instanced(height)
+        pairs = used_levels(made, height) if near else shared.levels(height)
         for kind, level in pairs:
-            if made.instanced(height):
+            if near:
                 name = shared.model_name(kind, level)
                 assert shared.model(kind, level).uri == f"shared/{name}.bin"
             else:
@@ -500,6 +501,9 @@ class Emptied:
 
     def tallest(self, count: int) -> np.ndarray:
         return self.whole.tallest(count)
+
+    def measured(self, count: int) -> np.ndarray:
+        return self.whole.measured(count)
 
     def plants(self, tile: int, most: int | None = None) -> Plants:
         return self.whole.plants(tile, 0 if tile in self.empty else most)

@@ -21,7 +21,7 @@ from vegtool.preview.scenery import Scenery
 from vegtool.progress import Progress, silent
 from vegtool.scene import Scene, read_scene
 from vegtool.tiles.library import MANIFEST, Species, read_library
-from vegtool.tiles.placement import Placement, Plants, Tiles, placement_of
+from vegtool.tiles.placement import BoolArray, Placement, Plants, Tiles, placement_of
 from vegtool.tiles.species import check_reading, notes_on, placed, species_of
 from vegtool.tiles.terrain import Terrain, terrain_of
 
@@ -111,6 +111,10 @@ class Row:
     def tallest(self, count: int) -> FloatArray:
         """(count,) metres that no plant of each species is taller than; NaN: the model's own."""
         return np.full(count, np.nan)
+
+    def measured(self, count: int) -> BoolArray:
+        """(count,) bool, whether all plants of each species have a height of their own."""
+        return np.zeros(count, bool)
 
     def plants(self, tile: int, most: int | None = None) -> Plants:
         count, origin = len(self.foot), self.foot.mean(axis=0)

@@ -17,7 +17,7 @@ from vegtool.progress import Progress
 from vegtool.scene import Scene
 from vegtool.tiles.hashing import draws, hashes, key
 from vegtool.tiles.order import spread_order
-from vegtool.tiles.placement import LongArray, Plants, Tiles
+from vegtool.tiles.placement import BoolArray, LongArray, Plants, Tiles
 from vegtool.tiles.projection import (
     NORTHERN,
     SOUTHERN,
@@ -64,6 +64,11 @@ class Inventory:
         found = np.full(count, np.nan)
         np.fmax.at(found, self.species, self.height)
         return found
+
+    def measured(self, count: int) -> BoolArray:
+        """(count,) bool, whether all plants of each species have a height of their own."""
+        without = self.species[np.isnan(self.height)]
+        return np.asarray(np.bincount(without, minlength=count)[:count] == 0)
 
     def plants(self, tile: int, most: int | None = None) -> Plants:
         """The plants of a tile, 0..t-1, or the first `most` of them."""

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from vegtool.scene import Scene
     from vegtool.tiles.terrain import Terrain
 
+BoolArray = npt.NDArray[np.bool_]
 LongArray = npt.NDArray[np.int64]
 
 METHODS = {
@@ -138,6 +139,10 @@ class Placement(Protocol):
 
     def tallest(self, count: int) -> FloatArray:
         """(count,) metres that no plant of each species is taller than; NaN: the model's own."""
+
+    def measured(self, count: int) -> BoolArray:
+        """(count,) bool, whether all plants of each species have a height of their own; those that
+        have none are as tall as their model."""
 
     def plants(self, tile: int, most: int | None = None) -> Plants:
         """The plants of a tile, 0..t-1, or the first `most` of them."""

@@ -30,7 +30,7 @@ from vegtool.tiles.pattern import (
     pattern,
     slacks,
 )
-from vegtool.tiles.placement import LongArray, Plants, Tiles
+from vegtool.tiles.placement import BoolArray, LongArray, Plants, Tiles
 from vegtool.tiles.rules import Rules, rules_of
 from vegtool.tiles.terrain import Terrain
 from vegtool.tiles.variation import DRAWS, heights, tints, yaws
@@ -77,6 +77,10 @@ class Procedural:
         """(count,) metres that no plant of each species is taller than; NaN: the model's own."""
         limits = [table.height_m for table in self.rules.tables[:count]]
         return np.array([np.nan if limit is None else limit[1] for limit in limits])
+
+    def measured(self, count: int) -> BoolArray:
+        """(count,) bool, whether all plants of each species have a height of their own."""
+        return np.array([table.height_m is not None for table in self.rules.tables[:count]])
 
     def plants(self, tile: int, most: int | None = None) -> Plants:
         """The plants of a tile, 0..t-1, or the first `most` of them."""

@@ -135,10 +135,10 @@ class Pyramid:
     def largest(self) -> FloatArray:
         """(s,) scale that no plant of each species is above."""
         own = np.array([one.height for one in self.species])
-        tallest = self.placement.tallest(len(own))
-        return np.asarray(
-            np.fmax(1.0, tallest / own)
-        )  # plants without a height are as tall as their model
+        known = self.placement.tallest(len(own)) / own
+        alone = self.placement.measured(len(own)) & np.isfinite(known)
+        # plants without a height are as tall as their model
+        return np.where(alone, known, np.fmax(1.0, known))
 
     @cached_property
     def _around(self) -> FloatArray:
