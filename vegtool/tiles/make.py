@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vegtool.arrays import FloatArray
-from vegtool.formats.gltf import level_glb
-from vegtool.formats.gltf_tile import Instances, instanced_glb, merged_glb
+from vegtool.formats.gltf_tile import Instances, far_glb, instanced_glb, merged_glb
 from vegtool.plant import Plant
 from vegtool.tiles.levels import fitting, level_at
 from vegtool.tiles.merge import merged
@@ -102,7 +101,7 @@ def _reclustered(
     pyramid: Pyramid, node: Node, plants: int, quarter: Callable[[Node], Plant | None]
 ) -> Tile:
     from vegtool.measure.pictures import client_plant
-    from vegtool.tiles.recluster import group_of, reclustered
+    from vegtool.tiles.recluster import drawing, group_of, reclustered
 
     tree, options = pyramid.tree, pyramid.options
     origin = pyramid.origin(node)
@@ -114,8 +113,10 @@ def _reclustered(
         group = group_of(list(there.values()), places, str(node))
     away = pyramid.from_m(tree.height(node.level)) + SEEN_FROM * tree.side(node.level)
     level = reclustered(group, options.triangles, away, pyramid.display, options.max_texture)
+    with timed(seconds, "writing"):
+        data = far_glb(*drawing(level), str(node), level.unlit, options.plain)
     error = None if level.geometric_error_m is None else level.geometric_error_m[1]
     return Tile(
-        node, level_glb(level, str(node)), "reclustered", plants, level.triangles, 1, error,
+        node, data, "reclustered", plants, level.triangles, 1, error,
         client_plant(level).bounds + origin, {**seconds, **level.seconds},
     )  # fmt: skip
