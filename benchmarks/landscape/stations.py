@@ -58,8 +58,8 @@ STATIONS = (
     Station("far", (0.0, 120.0, 700.0), 0.0, -10.0, 0.10),
     Station("above", (0.0, 250.0, 150.0), 0.0, -60.0, 0.10),
 )
-"""A walker 3 m before the plants; one between them, whose eye is in a conifer's branch; one on a hill
-120 m before them; one 700 m away; one above."""
+"""A walker 3 m before the plants; one between them, whose eye is in a conifer's branch; one on a
+hill 120 m before them; one 700 m away; one above."""
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vegtool.arrays import FloatArray, IntArray
-from vegtool.formats.gltf import level_glb
-from vegtool.formats.gltf_tile import GroupPlants, Instances, instanced_glb, merged_glb
+from vegtool.formats.gltf_tile import (
+    GroupPlants,
+    Instances,
+    far_glb,
+    instanced_glb,
+    merged_glb,
+)
 from vegtool.formats.plant_table import PlantTable
 from vegtool.plant import Plant
 from vegtool.tiles.levels import COARSEST, fitting
@@ -64,9 +69,7 @@ def chosen(pyramid: Pyramid, shared: Shared, node: Node, stand: Stand) -> Chosen
 
     def at(times: float, of_level: FloatArray) -> Chosen:
         away = times * pyramid.made_for_m(height)
-        level, more = fitting(
-            stand, pyramid.switch_m, of_level, away, most, pyramid.finest(height)
-        )
+        level, more = fitting(stand, pyramid.switch_m, of_level, away, most, pyramid.finest(height))
         return Chosen(level, times * more)
 
     if near:
@@ -158,7 +161,7 @@ def reclustered_tile(
     Raises CapabilityError where nothing can draw.
     """
     from vegtool.measure.pictures import client_plant
-    from vegtool.tiles.recluster import group_of, reclustered
+    from vegtool.tiles.recluster import drawing, group_of, reclustered
 
     tree, options = pyramid.tree, pyramid.options
     origin = pyramid.origin(node)
@@ -166,8 +169,11 @@ def reclustered_tile(
     group = group_of([plant for _, plant in quarters], places, str(node))
     away = pyramid.from_m(tree.height(node.level)) + SEEN_FROM * tree.side(node.level)
     level = reclustered(group, pyramid.budget(node), away, pyramid.display, options.max_texture)
+    seconds = dict(level.seconds)
+    with timed(seconds, "writing"):
+        data = far_glb(*drawing(level), str(node), level.unlit, options.plain)
     error = below_m + (0.0 if level.geometric_error_m is None else level.geometric_error_m[1])
     return Tile(
-        node, level_glb(level, str(node)), "reclustered", plants, level.triangles, 1, error,
-        client_plant(level).bounds + origin, dict(level.seconds),
+        node, data, "reclustered", plants, level.triangles, 1, error,
+        client_plant(level).bounds + origin, seconds,
     )  # fmt: skip

@@ -138,7 +138,7 @@ class Pyramid:
         known = self.placement.tallest(len(own)) / own
         alone = self.placement.measured(len(own)) & np.isfinite(known)
         # plants without a height are as tall as their model
-        return np.where(alone, known, np.fmax(1.0, known))
+        return np.asarray(np.where(alone, known, np.fmax(1.0, known)))
 
     @cached_property
     def _around(self) -> FloatArray:

@@ -63,9 +63,7 @@ class Shared:
 
     def model_files(self, kind: int, level: int) -> dict[str, bytes]:
         """A level's files, by their names in FOLDER."""
-        plant = limited(
-            self.pyramid.species[kind].levels[level], self.pyramid.options.near_texture
-        )
+        plant = limited(self.pyramid.species[kind].levels[level], self.pyramid.options.near_texture)
         return model_files(plant, self.model_name(kind, level))
 
     def model(self, kind: int, level: int) -> SharedModel:
