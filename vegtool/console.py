@@ -41,7 +41,7 @@ class Console:
             yield silent
             return
         from rich.console import Console as RichConsole
-        from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+        from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
         from rich.progress import Progress as Bars
         from rich.table import Column
 
@@ -51,6 +51,8 @@ class Console:
             BarColumn(20),
             TextColumn("{task.percentage:>3.0f} %"),
             TimeElapsedColumn(),
+            TextColumn("left", style="dim"),
+            TimeRemainingColumn(),
             console=RichConsole(stderr=True),
             transient=True,
             expand=True,

@@ -189,6 +189,7 @@ def _of(species: Species, levels: int) -> Species:
         switch_m=np.array(species.switch_m[:levels]),
         fade=np.array(species.fade[:levels]),
         files=species.files[:levels],
+        error_m=species.error_m[:levels],
     )
 
 

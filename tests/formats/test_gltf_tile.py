@@ -17,7 +17,14 @@ from shared_models import shared_model
 from vegtool.arrays import unit
 from vegtool.formats import png, read_plant
 from vegtool.formats.gltf_data import open_gltf
-from vegtool.formats.gltf_tile import Instances, SheetFiles, instanced_glb, merged_glb
+from vegtool.formats.gltf_tile import (
+    Instances,
+    OwnPictures,
+    SheetFiles,
+    far_glb,
+    instanced_glb,
+    merged_glb,
+)
 from vegtool.formats.shared_model import SharedModel
 from vegtool.lod import Triangles
 from vegtool.plant import Material, Plant
@@ -224,6 +231,71 @@ def test_writing_changes_nothing_and_is_the_same_again() -> None:
     for plain in (False, True):
         assert merged_glb(one, BUMPED, "t", plain) == merged_glb(one, BUMPED, "t", plain)
     assert [getattr(one, f.name).tobytes() for f in fields(one)] == before
+
+
+# --------------------------------------------------------------------------- squares clustered anew
+
+OWN = OwnPictures(
+    np.stack(
+        [np.full((8, 16), value) for value in (70, 130, 45)] + [np.eye(8, 16) * 200], 2
+    ).astype(np.uint8),
+    np.full((8, 16, 3), (120, 140, 250), np.uint8),
+)
+
+
+@pytest.mark.parametrize("plain", [False, True])
+@pytest.mark.parametrize("own", [None, OWN, replace(OWN, normal=None)])
+def test_a_far_square_is_read_back(tmp_path: Path, own: OwnPictures | None, plain: bool) -> None:
+    one = group()
+    found = read(tmp_path, far_glb(one, own, "t", plain=plain))
+    step = 1e-5 if plain else 0.51 * extent(one) / SHORT
+    np.testing.assert_allclose(found.positions, one.positions, atol=step)
+    np.testing.assert_allclose(found.normals, one.normals, atol=1e-6 if plain else 2 / BYTE)
+    np.testing.assert_array_equal(found.faces.ravel(), one.indices)
+    assert found.colors is not None and one.colors is not None
+    np.testing.assert_allclose(found.colors, one.colors, atol=1 / SHORT)
+    (material,) = found.materials
+    assert material.double_sided and not material.unlit
+    if own is None:
+        assert material.color_texture is None and material.alpha_mode == "opaque"
+        return
+    np.testing.assert_allclose(found.uvs, one.uvs, atol=1e-6 if plain else 1 / SHORT)
+    assert material.color_texture is not None and material.alpha_mode == "mask"
+    np.testing.assert_array_equal(material.color_texture.pixels, own.color)
+    if own.normal is None:
+        assert material.normal_texture is None
+    else:
+        assert material.normal_texture is not None
+        np.testing.assert_array_equal(material.normal_texture.pixels[..., :3], own.normal)
+
+
+def test_a_far_square_holds_no_more_than_it_needs() -> None:
+    """Opaque triangles of one colour each: 20 bytes a vertex, and nothing else."""
+    values = chunk(far_glb(group(), None, "t"))
+    (primitive,) = values["meshes"][0]["primitives"]
+    assert set(primitive["attributes"]) == {"POSITION", "NORMAL", "COLOR_0"}
+    assert "indices" not in primitive and "textures" not in values and "samplers" not in values
+    assert values["buffers"][0]["byteLength"] == 90 * (8 + 4 + 8)
+    assert "alphaMode" not in values["materials"][0]
+    (primitive,) = chunk(far_glb(group(), OWN, "t"))["meshes"][0]["primitives"]
+    assert {"TANGENT", "TEXCOORD_0"} < set(primitive["attributes"])
+    bare = chunk(far_glb(group(), replace(OWN, normal=None), "t"))
+    (primitive,) = bare["meshes"][0]["primitives"]
+    assert "TANGENT" not in primitive["attributes"] and len(bare["images"]) == 1
+    shared = replace(group(), indices=group().indices[::-1].copy())
+    (primitive,) = chunk(far_glb(shared, None, "t"))["meshes"][0]["primitives"]
+    assert "indices" in primitive
+
+
+def test_a_far_square_says_that_light_is_in_its_colours(tmp_path: Path) -> None:
+    for own in (None, replace(OWN, normal=None)):
+        found = read(tmp_path, far_glb(group(), own, "t", unlit=True))
+        assert found.materials[0].unlit
+
+
+def test_far_squares_are_the_same_again() -> None:
+    for own in (None, OWN):
+        assert far_glb(group(), own, "t") == far_glb(group(), own, "t")
 
 
 # ------------------------------------------------------------------------------- instances

@@ -241,3 +241,19 @@ def test_inputs_stay_and_releasing_frees() -> None:
     np.testing.assert_array_equal(frame.rows, before[2])
     assert landscape.texture_bytes == 0 and landscape.ctx.error == "GL_NO_ERROR"
     landscape.release()
+
+
+def test_what_is_removed_is_gone_and_others_stay() -> None:
+    """One of two cards is drawn as before, by its own index, which a third does not take."""
+    near, far = cards(np.zeros(3), 1.0, RED), cards(np.zeros(3), 0.5, RED)
+    with Landscape([np.zeros((8, 8), np.uint8)]) as landscape:
+        indices = [landscape.add(card, ordered(card)) for card in (near, far)]
+        frame = Frame(instance(), (Batch(indices[1], 0, 1, WHOLE),))
+        before = picture(landscape, frame, facing(20, 4.0), LIGHT, samples=4)
+        kept = landscape.plants[1]
+        landscape.remove(indices[0])
+        assert landscape.plants == [kept]
+        after = picture(landscape, frame, facing(20, 4.0), LIGHT, samples=4)
+        assert before.tobytes() == after.tobytes() and before[..., 3].any()
+        assert landscape.add(near, ordered(near)) not in indices
+        assert landscape.ctx.error == "GL_NO_ERROR"

@@ -16,10 +16,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import test_tiles_run
+from plant_tables import columns
 from test_tiles_run import COUNT, HIGH, PLACED, files, inventory, library, pyramid, world
 from tile_cases import TWO_SPECIES, scene_of
 
 from vegtool.errors import OutputError, UsageError
+from vegtool.formats.gltf_data import open_gltf
 from vegtool.formats.tileset_check import check_tileset
 from vegtool.seeding import generator
 from vegtool.tiles import jobs as jobs_module
@@ -445,6 +448,46 @@ def test_plain_files_have_an_index(whole: Whole, tmp_path: Path) -> None:
             above = tiles[tile["in"]]
             assert tile["in"] < number and above["from_m"] >= 2 * tile["from_m"]
     assert tiles[0]["plants"] == COUNT
+
+
+def test_tiles_tell_which_plant_is_which_where_that_is_asked_for(
+    whole: Whole, tmp_path: Path
+) -> None:
+    """Every plant once on each level; those without it are made anew, the pictures are not."""
+    of = replace(whole[0], out=tmp_path / "out", options=replace(OPTIONS, attributes=True))
+    shutil.copytree(whole[0].out, of.out)
+    again = made(of)
+    assert again and not [name for name in again if not name[0].isdigit()]
+    rows = {row: name for row, (_, _, name) in enumerate(test_tiles_run.rows(), start=1)}
+    tree, told = world_of(of).pyramid.tree, dict[int, dict[int, str]]()
+    for level in range(tree.depth + 1):
+        for node in tree.nodes(level):
+            file = open_gltf(of.out / file_of(node))
+            metadata = file.json.get("extensions", {}).get("EXT_structural_metadata")
+            for table in range(len(metadata["propertyTables"]) if metadata else 0):
+                found = columns(file, table)
+                pairs = zip(found["id"].tolist(), found["species"].tolist(), strict=True)
+                told.setdefault(level, {}).update(pairs)
+    assert tree.depth in told and tree.depth - 1 in told
+    assert all(found == rows for found in told.values())
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no SIGINT for one process on Windows")
+def test_an_interrupted_run_leaves_nothing_half_written(whole: Whole, tmp_path: Path) -> None:
+    """Ctrl-C, with two processes at work."""
+    of, wanted = whole
+    of = replace(of, out=tmp_path / "out")
+    process = subprocess.Popen(command(of, "-j", "2"), stderr=subprocess.PIPE)
+    until = time.monotonic() + 60
+    while not list(of.out.glob("tiles/*.glb")):
+        assert time.monotonic() < until and process.poll() is None
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    _, text = process.communicate(timeout=60)
+    assert process.returncode == 130 and b"Traceback" not in text
+    there = files(of.out)
+    assert not [name for name in there if name.endswith(".part")]
+    assert all(wanted[name] == data for name, data in there.items() if name != JOURNAL)
 
 
 # -------------------------------------------------------------------------------------- the journal

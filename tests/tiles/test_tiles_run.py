@@ -343,6 +343,8 @@ def test_a_moved_landscape_has_the_same_tiles_at_another_place(
         for one in (here, there)
     )
     assert here == there
+    places = [np.array(one["extras"].pop("origin_m")) for one in (old, new)]
+    assert (places[1] - places[0]).tolist() == [away, 0.0, 0.0]
     moved = np.array(new.pop("transform")) - old.pop("transform")
     assert moved.tolist() == [0.0] * 12 + [away, 0.0, 0.0, 0.0]
     assert old == new

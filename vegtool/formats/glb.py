@@ -44,9 +44,15 @@ class Document:
         """Give an object that was added before more properties."""
         self._objects[kind][index].update(properties)
 
-    def add_view(self, data: bytes, target: int | None = None, stride: int | None = None) -> int:
-        """Append bytes as a buffer view that starts at a multiple of four; return its index."""
-        padding = -self._length % _ALIGNMENT
+    def add_view(
+        self,
+        data: bytes,
+        target: int | None = None,
+        stride: int | None = None,
+        alignment: int = _ALIGNMENT,
+    ) -> int:
+        """Append bytes as a buffer view that starts at a multiple of so many; return its index."""
+        padding = -self._length % alignment
         offset = self._length + padding
         self._parts += [bytes(padding), data]
         self._length = offset + len(data)
@@ -86,6 +92,10 @@ class Document:
             accessor["min"] = rows.min(axis=0).tolist()
             accessor["max"] = rows.max(axis=0).tolist()
         return self.add("accessors", **accessor)
+
+    def extend(self, name: str, value: Any) -> None:
+        """Give the document itself an extension."""
+        self._objects.setdefault("extensions", {})[name] = value
 
     def use_extension(self, name: str, required: bool = False) -> None:
         """List an extension as used, or as required too."""

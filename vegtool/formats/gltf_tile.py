@@ -1,8 +1,10 @@
-"""Tiles of a landscape as .glb files: merged groups, and instances of models that tiles share.
+"""Tiles of a landscape as .glb files: merged groups, instances of models that tiles share, and
+squares that were clustered anew.
 
 Sources: glTF 2.0 specification; KHR_mesh_quantization and EXT_mesh_gpu_instancing (extensions,
-Khronos glTF repository). Textures, and the vertices of instanced models, are files of their own,
-which clients load once. Positions are in metres from the tile's centre.
+Khronos glTF repository). Textures of merged groups, and the vertices of instanced models, are files
+of their own, which clients load once; pictures of one square alone lie within its file. Positions
+are in metres from the tile's centre.
 """
 
 from __future__ import annotations
@@ -14,9 +16,17 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from vegtool.arrays import FloatArray
+from vegtool.arrays import ByteArray, FloatArray
+from vegtool.formats import png
 from vegtool.formats.glb import ELEMENT_ARRAY_BUFFER, Document
 from vegtool.formats.gltf_material import UNLIT
+from vegtool.formats.plant_table import (
+    PlantTable,
+    add_tables,
+    of_instances,
+    of_vertices,
+    vertex_ids,
+)
 from vegtool.formats.shared_model import SharedModel
 from vegtool.lod import Triangles
 
@@ -29,8 +39,9 @@ floats, so that plants stay where they are beside each other."""
 SHORT_INDICES = 65535
 """Vertices; index 65535 itself is reserved for primitive restart."""
 LINEAR, LINEAR_MIPMAP_LINEAR, CLAMP_TO_EDGE = 9729, 9987, 33071
-ROUGHNESS = 0.9
+DULL = {"metallicFactor": 0.0, "roughnessFactor": 0.9}
 """Foliage seen from afar has no highlight of its own."""
+MASKED = {"alphaMode": "MASK", "alphaCutoff": 0.5}
 
 
 @dataclass(frozen=True)
@@ -44,25 +55,80 @@ class SheetFiles:
     unlit: bool = False
 
 
-def merged_glb(group: Triangles, sheet: SheetFiles, name: str, plain: bool = False) -> bytes:
+@dataclass(frozen=True, eq=False)
+class GroupPlants:
+    """The plants of a merged group: what is known of each, and (v,) int64 which of them each vertex
+    is of."""
+
+    table: PlantTable
+    of_vertex: npt.NDArray[np.int64]
+
+
+def merged_glb(
+    group: Triangles, sheet: SheetFiles, name: str, plain: bool = False,
+    plants: GroupPlants | None = None,
+) -> bytes:  # fmt: skip
     """A merged group: one node, one mesh, one primitive, one material.
 
-    plain: float32 in place of KHR_mesh_quantization.
+    plain: float32 in place of KHR_mesh_quantization. plants: for clients that ask which is which.
     """
     document = Document()
-    with_tangents = sheet.normal is not None
-    placed: dict[str, list[float]] = {}
-    if plain:
-        attributes = _plain(document, group, with_tangents)
-    else:
-        attributes, placed = _quantized(document, group, with_tangents)
-        document.use_extension(QUANTIZATION, required=True)
+    attributes, placed = _vertices(
+        document, group, True, sheet.normal is not None, plain, LARGEST_STEP_M
+    )
     kind = np.uint16 if len(group.positions) <= SHORT_INDICES else np.uint32
+    more: dict[str, Any] = {}
+    if plants is not None:
+        add_tables(document, [plants.table])
+        attributes["_FEATURE_ID_0"] = document.add_accessor(vertex_ids(plants.of_vertex))
+        more["extensions"] = of_vertices(document, 0, len(plants.table))
     primitive = {
         "attributes": attributes,
         "indices": document.add_accessor(group.indices.astype(kind), ELEMENT_ARRAY_BUFFER),
         "material": _material(document, sheet, name),
+        **more,
     }
+    return _shown(document, primitive, name, placed)
+
+
+@dataclass(frozen=True, eq=False)
+class OwnPictures:
+    """Pictures of one square alone. color: (h, w, 4) uint8, sRGB, straight alpha, cut off at one
+    half. normal: (h, w, 3) uint8 tangent space, or None."""
+
+    color: ByteArray
+    normal: ByteArray | None
+
+
+def far_glb(
+    group: Triangles,
+    pictures: OwnPictures | None,
+    name: str,
+    unlit: bool = False,
+    plain: bool = False,
+) -> bytes:
+    """A square clustered anew, drawn from both sides: one node, one mesh, one primitive, one
+    material.
+
+    pictures: written into the file; None for opaque triangles, which then have the colours of their
+    vertices and no texture coordinates. Vertices that no two triangles share need no indices, and
+    have none. plain: float32 in place of KHR_mesh_quantization.
+    """
+    document = Document()
+    textured, bumped = pictures is not None, pictures is not None and pictures.normal is not None
+    attributes, placed = _vertices(document, group, textured, bumped, plain)
+    primitive: dict[str, Any] = {"attributes": attributes}
+    if not np.array_equal(group.indices, np.arange(len(group.positions))):
+        kind = np.uint16 if len(group.positions) <= SHORT_INDICES else np.uint32
+        indices = document.add_accessor(group.indices.astype(kind), ELEMENT_ARRAY_BUFFER)
+        primitive["indices"] = indices
+    primitive["material"] = _own_material(document, pictures, name, unlit)
+    return _shown(document, primitive, name, placed)
+
+
+def _shown(
+    document: Document, primitive: dict[str, Any], name: str, placed: dict[str, list[float]]
+) -> bytes:
     mesh = document.add("meshes", name=name, primitives=[primitive])
     document.show(document.add("nodes", name=name, mesh=mesh, **placed))
     return document.glb()
@@ -71,23 +137,29 @@ def merged_glb(group: Triangles, sheet: SheetFiles, name: str, plain: bool = Fal
 @dataclass(frozen=True, eq=False)
 class Instances:
     """Plants that are drawn as one model. place: (n, 3) metres. yaw: (n,) radians about +y. scale:
-    (n,). tint: (n, 3) linear factors."""
+    (n,). tint: (n, 3) linear factors. plants: what is known of each, for clients that ask."""
 
     model: SharedModel
     place: FloatArray
     yaw: FloatArray
     scale: FloatArray
     tint: npt.NDArray[np.float32]
+    plants: PlantTable | None = None
 
 
 def instanced_glb(drawn: Sequence[Instances], name: str) -> bytes:
-    """Instances of shared models: a node and a mesh for each model. Raises ValueError for none."""
+    """Instances of shared models: a node and a mesh for each model. What is known of plants is
+    written where it is known of all. Raises ValueError for none."""
     if not drawn:
         raise ValueError("instanced_glb: expected instances")
     document = Document()
     document.use_extension(INSTANCING, required=True)
     nodes = []
-    for one in drawn:
+    tables = [one.plants for one in drawn if one.plants is not None]
+    with_plants = len(tables) == len(drawn)
+    if with_plants:
+        add_tables(document, tables)
+    for index, one in enumerate(drawn):
         half = one.yaw / 2
         rotation = np.zeros((len(half), 4), np.float32)
         rotation[:, 1], rotation[:, 3] = np.sin(half), np.cos(half)
@@ -100,33 +172,53 @@ def instanced_glb(drawn: Sequence[Instances], name: str) -> bytes:
         }
         attributes = {key: document.add_accessor(v, None) for key, v in values.items()}
         mesh = one.model.add_to(document)
-        extension = {INSTANCING: {"attributes": attributes}}
+        extension: dict[str, Any] = {INSTANCING: {"attributes": attributes}}
+        if with_plants:
+            extension |= of_instances(document, index, len(half))
         nodes.append(document.add("nodes", name=one.model.name, mesh=mesh, extensions=extension))
     document.show(document.add("nodes", name=name, children=nodes))
     return document.glb()
 
 
-def _plain(document: Document, group: Triangles, with_tangents: bool) -> dict[str, int]:
+def _vertices(
+    document: Document,
+    group: Triangles,
+    textured: bool,
+    with_tangents: bool,
+    plain: bool,
+    most_step_m: float = np.inf,
+) -> tuple[dict[str, int], dict[str, list[float]]]:
+    """Attributes, and what places the node that draws them."""
+    if plain:
+        return _plain(document, group, textured, with_tangents), {}
+    document.use_extension(QUANTIZATION, required=True)
+    return _quantized(document, group, textured, with_tangents, most_step_m)
+
+
+def _plain(
+    document: Document, group: Triangles, textured: bool, with_tangents: bool
+) -> dict[str, int]:
     attributes = {
         "POSITION": document.add_accessor(group.positions.astype(np.float32), bounds=True),
         "NORMAL": document.add_accessor(group.normals.astype(np.float32)),
     }
     if with_tangents:
         attributes["TANGENT"] = document.add_accessor(group.tangents.astype(np.float32))
-    attributes["TEXCOORD_0"] = document.add_accessor(group.uvs.astype(np.float32))
+    if textured:
+        attributes["TEXCOORD_0"] = document.add_accessor(group.uvs.astype(np.float32))
     return attributes | _colors(document, group)
 
 
 def _quantized(
-    document: Document, group: Triangles, with_tangents: bool
+    document: Document, group: Triangles, textured: bool, with_tangents: bool, most_step_m: float
 ) -> tuple[dict[str, int], dict[str, list[float]]]:
     """Attributes in 8 and 16 bits, and the node's place that undoes it: one factor for all axes, as
-    normals want it."""
+    normals want it. Positions are floats where a step would be more than so many metres."""
     low, high = group.positions.min(axis=0), group.positions.max(axis=0)
     step = float((high - low).max()) / STEPS or 1.0
     placed = {"translation": low.tolist(), "scale": [step] * 3}
     positions: npt.NDArray[Any] = np.rint((group.positions - low) / step).astype(np.uint16)
-    if step > LARGEST_STEP_M:
+    if step > most_step_m:
         positions, placed = group.positions.astype(np.float32), {}
     attributes = {
         "POSITION": document.add_accessor(positions, bounds=True),
@@ -134,8 +226,9 @@ def _quantized(
     }
     if with_tangents:
         attributes["TANGENT"] = document.add_accessor(_bytes(group.tangents), normalized=True)
-    uvs = np.rint(np.clip(group.uvs, 0, 1) * STEPS).astype(np.uint16)
-    attributes["TEXCOORD_0"] = document.add_accessor(uvs, normalized=True)
+    if textured:
+        uvs = np.rint(np.clip(group.uvs, 0, 1) * STEPS).astype(np.uint16)
+        attributes["TEXCOORD_0"] = document.add_accessor(uvs, normalized=True)
     return attributes | _colors(document, group), placed
 
 
@@ -152,10 +245,7 @@ def _colors(document: Document, group: Triangles) -> dict[str, int]:
 
 
 def _material(document: Document, sheet: SheetFiles, name: str) -> int:
-    sampler = document.add(
-        "samplers", magFilter=LINEAR, minFilter=LINEAR_MIPMAP_LINEAR, wrapS=CLAMP_TO_EDGE,
-        wrapT=CLAMP_TO_EDGE,
-    )  # fmt: skip
+    sampler = _sampler(document)
 
     def texture(uri: str) -> dict[str, int]:
         image = document.add("images", uri=uri)
@@ -165,17 +255,47 @@ def _material(document: Document, sheet: SheetFiles, name: str) -> int:
     if sheet.normal is not None:
         more["normalTexture"] = texture(sheet.normal)
     if sheet.unlit:
-        document.use_extension(UNLIT)
-        more["extensions"] = {UNLIT: {}}
+        more |= _unlit(document)
     return document.add(
         "materials",
         name=name,
-        pbrMetallicRoughness={
-            "baseColorTexture": texture(sheet.color), "metallicFactor": 0.0,
-            "roughnessFactor": ROUGHNESS,
-        },
-        alphaMode="MASK",
-        alphaCutoff=0.5,
+        pbrMetallicRoughness={"baseColorTexture": texture(sheet.color), **DULL},
+        **MASKED,
         doubleSided=sheet.double_sided,
         **more,
+    )
+
+
+def _own_material(document: Document, pictures: OwnPictures | None, name: str, unlit: bool) -> int:
+    surface: dict[str, Any] = dict(DULL)
+    more: dict[str, Any] = _unlit(document) if unlit else {}
+    if pictures is not None:
+        sampler = _sampler(document)
+
+        def texture(pixels: ByteArray, kind: str) -> dict[str, int]:
+            view = document.add_view(png.encode(pixels))
+            image = document.add(
+                "images", name=f"{name}_{kind}", mimeType="image/png", bufferView=view
+            )
+            return {"index": document.add("textures", source=image, sampler=sampler)}
+
+        surface["baseColorTexture"] = texture(pictures.color, "color")
+        if pictures.normal is not None:
+            more["normalTexture"] = texture(pictures.normal, "normal")
+        more |= MASKED
+    return document.add(
+        "materials", name=name, pbrMetallicRoughness=surface, doubleSided=True, **more
+    )
+
+
+def _sampler(document: Document) -> int:
+    """Of pictures that have neighbours, or edges."""
+    return document.add(
+        "samplers", magFilter=LINEAR, minFilter=LINEAR_MIPMAP_LINEAR, wrapS=CLAMP_TO_EDGE,
+        wrapT=CLAMP_TO_EDGE,
     )  # fmt: skip
+
+
+def _unlit(document: Document) -> dict[str, Any]:
+    document.use_extension(UNLIT)
+    return {"extensions": {UNLIT: {}}}

@@ -44,11 +44,13 @@ def tileset_files(root: TileEntry, placed: FloatArray | None) -> dict[str, bytes
     """TILESET and, where there are many tiles, others that it refers to, beside the tiles.
 
     placed: (4, 4) from the scene's frame, z up, to the earth's; None where it has no place there.
+    Where the root is in the scene's frame, y up, is among its extras: origin_m.
     """
     base = np.eye(4) if placed is None else placed
     files: dict[str, bytes] = {}
     apart = APART if _count(root) > MOST else None
     top = _tile(root, "", apart, 0, files)
+    top["extras"]["origin_m"] = root.origin.tolist()
     top["transform"] = _columns(base @ _translation(root.origin))
     files[TILESET] = _file(top, root)
     return files

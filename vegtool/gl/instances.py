@@ -83,6 +83,11 @@ class InstancedPlant(OnGpu):
         self._indices.release()
         self.buffers.release()
 
+    @property
+    def buffer_bytes(self) -> int:
+        """Of vertices and indices on the GPU."""
+        return int(self._vertices.size + self._indices.size)
+
     def faces_kept(self, share: float) -> int:
         """How many faces are drawn of an instance that keeps a share of its elements."""
         return sum(self._kept(number, share) for number in range(len(self._ranges)))

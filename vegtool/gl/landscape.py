@@ -40,7 +40,7 @@ GROUND_COLOR = (0.105, 0.125, 0.055)
 class Batch:
     """Instances of one plant that are drawn by one call for each of its materials.
 
-    plant: index among those of the landscape. first, count: rows. share: the most that any of them
+    plant: index that the landscape gave it. first, count: rows. share: the most that any of them
     keeps of its elements. fading: whether texels are hidden of some.
     """
 
@@ -96,12 +96,18 @@ class Landscape(OnGpu):
         ctx: moderngl.Context | None = None,
     ) -> None:
         self.ctx = ctx or context()
-        self.plants: list[InstancedPlant] = []
+        self._plants: dict[int, InstancedPlant] = {}
+        self._added = 0
         self.fading = "pixels" if pixels_fade else "texels"
         self._noise = _noise_texture(self.ctx, noise)
         self._rows = self.ctx.buffer(reserve=INSTANCE.itemsize * 1024, dynamic=True)
         self._samples, self._pace = self.ctx.query(samples=True), Pace(self.ctx)
         self._ground = None if ground is None else _Ground(self.ctx, ground)
+
+    @property
+    def plants(self) -> list[InstancedPlant]:
+        """Those that are there, in the order in which they came."""
+        return list(self._plants.values())
 
     def add(
         self,
@@ -111,18 +117,23 @@ class Landscape(OnGpu):
         mipmaps: bool = True,
         shared: Textures | None = None,
     ) -> int:
-        """Upload one more; returns its index. mipmaps: none for what is supersampled. shared: as of
-        PlantBuffers."""
-        self.plants.append(
-            InstancedPlant(plant, elements, mipmaps=mipmaps, shared=shared, ctx=self.ctx)
+        """Upload one more; returns its index, which no other gets. mipmaps: none for what is
+        supersampled. shared: as of PlantBuffers."""
+        self._plants[self._added] = InstancedPlant(
+            plant, elements, mipmaps=mipmaps, shared=shared, ctx=self.ctx
         )
-        return len(self.plants) - 1
+        self._added += 1
+        return self._added - 1
+
+    def remove(self, plant: int) -> None:
+        """Free one of them; what it shares stays."""
+        self._plants.pop(plant).release()
 
     def release(self) -> None:
         """Free everything on the GPU."""
-        for plant in self.plants:
+        for plant in self._plants.values():
             plant.release()
-        self.plants.clear()
+        self._plants.clear()
         self._noise.release()
         self._rows.release()
         if self._ground is not None:
@@ -131,7 +142,7 @@ class Landscape(OnGpu):
     @property
     def texture_bytes(self) -> int:
         """Of all plants' textures, mips counted."""
-        return sum(plant.buffers.texture_bytes for plant in self.plants)
+        return sum(plant.buffers.texture_bytes for plant in self._plants.values())
 
     def draw(
         self,
@@ -168,7 +179,7 @@ class Landscape(OnGpu):
         draws = triangles = 0
         told: set[moderngl.Program] = set()
         for batch in frame.batches:
-            plant = self.plants[batch.plant]
+            plant = self._plants[batch.plant]
             fading = self.fading if batch.fading else ""
             for group in plant.buffers.groups:
                 shader = instance_program(plant.buffers, group, fading, ANISOTROPY, view)

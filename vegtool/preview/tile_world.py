@@ -49,11 +49,12 @@ class TileWorld:
     def details(self, focal_px: float) -> list[str]:
         """From where tiles of each level are drawn, 0 being the finest."""
         found, tiles = [], self.tileset
-        for depth in range(int(tiles.depth.max()) + 1):
-            here = tiles.depth == depth
-            away = tiles.error_m[here].max() * focal_px / CLIENT_PX
-            level = int(tiles.depth.max()) - depth
-            found.append(f"level {level}: {int(here.sum()):,} tiles, drawn from {away:,.3g} m")
+        for depth in range(tiles.deepest + 1):
+            here = tiles.shown & (tiles.depth == depth)
+            if here.any():
+                away = tiles.error_m[here].max() * focal_px / CLIENT_PX
+                level, count = tiles.deepest - depth, int(here.sum())
+                found.append(f"level {level}: {count:,} tiles, drawn from {away:,.3g} m")
         return found
 
 
@@ -83,7 +84,15 @@ def read_tile_world(file: Path) -> TileWorld:
 
 
 def _height(tiles: Tileset, xz: FloatArray) -> float:
-    low, high = tiles.low[:, [0, 2]], tiles.high[:, [0, 2]]
-    away = np.linalg.norm(np.maximum(0, np.maximum(low - xz, xz - high)), axis=1)
-    nearest = int(np.lexsort((-tiles.depth, np.round(away, 3)))[0])
+    """Of the feet on the deepest of the tiles that are nearest; no tile is nearer than those that
+    it is in."""
+    nearest, least, front = 0, np.inf, np.zeros(1, np.int64)
+    while len(front):
+        low, high = tiles.low[front][:, [0, 2]], tiles.high[front][:, [0, 2]]
+        away = np.linalg.norm(np.maximum(0, np.maximum(low - xz, xz - high)), axis=1)
+        away = np.round(away, 3)
+        least = min(least, float(away.min()))
+        front = front[away <= least]
+        nearest = int(front[0]) if len(front) else nearest
+        front = tiles.below(front)
     return float(tiles.feet_m[nearest].mean())

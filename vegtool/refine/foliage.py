@@ -48,14 +48,16 @@ ROUNDS = 3
 class Leaves:
     """The covered parts of n faces, in units of `radius` metres about `center`, (3,) metres.
 
-    area: (n,) half of what can be seen of them from all sides, which for a face seen from both is
-    its own. middle: (n, 3) centroid. spread: (n, 3, 3) second moment about it. normal: (n, 3) unit,
-    of the front. shading: (n, 3) unit, what light falls on. color: (n, 3) linear. seen: (n,) share,
-    0 to 1, that others do not hide. found: where rays meet them, whose `face` is an index into n.
+    face: (n,) which of the plant's they are. area: (n,) half of what can be seen of them from all
+    sides, which for a face seen from both is its own. middle: (n, 3) centroid. spread: (n, 3, 3)
+    second moment about it. normal: (n, 3) unit, of the front. shading: (n, 3) unit, what light
+    falls on. color: (n, 3) linear. seen: (n,) share, 0 to 1, that others do not hide. found: where
+    rays meet them, whose `face` is an index into n.
     """
 
     center: FloatArray
     radius: float
+    face: IntArray
     area: FloatArray
     middle: FloatArray
     spread: FloatArray
@@ -69,6 +71,11 @@ class Leaves:
     def __len__(self) -> int:
         return len(self.area)
 
+    @property
+    def weight(self) -> FloatArray:
+        """(n,) how much each counts where triangles are dealt out."""
+        return self.area * (UNSEEN + (1 - UNSEEN) * self.seen)
+
 
 @dataclass(frozen=True, eq=False)
 class Foliage(ColoredMesh):
@@ -78,8 +85,9 @@ class Foliage(ColoredMesh):
     scale: float
 
 
-def leaves_of(plant: Plant, faces: IntArray) -> Leaves | None:
-    """The leaves among a plant's faces, (k,) indices; None where they cover nothing."""
+def leaves_of(plant: Plant, faces: IntArray, views: FloatArray | None = None) -> Leaves | None:
+    """The leaves among a plant's faces, (k,) indices; None where they cover nothing. views: (d, 3)
+    unit vectors towards those who look; None for all around."""
     if not len(faces):
         return None
     cut = cutouts(plant, faces)
@@ -93,7 +101,7 @@ def leaves_of(plant: Plant, faces: IntArray) -> Leaves | None:
     corners = (corners[own] - center) / radius
     two_sided = np.array([m.double_sided for m in plant.materials], dtype=bool)
     both = np.asarray(two_sided[plant.face_material[faces[own]]])
-    rays = Rays.around(corners)
+    rays = Rays.around(corners, views=views)
     found = hits(rays, corners)
     shows = np.asarray(found.front | both[found.face])
     found = found.of(cut.covered(own[found.face], found.at) & shows)
@@ -103,6 +111,7 @@ def leaves_of(plant: Plant, faces: IntArray) -> Leaves | None:
     return Leaves(
         center,
         radius,
+        faces[own],
         covered[own] / radius**2 * np.where(both, 1.0, 0.5),
         np.einsum("fc,fci->fi", at, corners),
         np.einsum("fcd,fci,fdj->fij", moment, corners, corners, optimize=True),
@@ -130,11 +139,20 @@ def reduced_leaves(
             raise ValueError(f"{name}: expected a positive number, found {value}")
     if triangles < 1:
         return None
-    weight = leaves.area * (UNSEEN + (1 - UNSEEN) * leaves.seen)
     count = min(triangles, len(leaves))
     pixel = pixel_m / leaves.radius
     look = leaves.normal, leaves.shading, leaves.color
-    group = grouped(leaves.middle, *look, weight, count, pixel)
+    group = grouped(leaves.middle, *look, leaves.weight, count, pixel)
+    return foliage_of(leaves, group, factor)
+
+
+def foliage_of(leaves: Leaves, group: Ints, factor: float = 1.0, rounds: int = ROUNDS) -> Foliage:
+    """A triangle for each group of leaves, (n,) labels of which each is used; factor as above.
+
+    rounds: in which the area of all triangles is brought to cover what all leaves do; with none,
+    each covers what its leaves do.
+    """
+    weight = leaves.weight
     count = int(group.max()) + 1
     normal = facing(leaves, group, count)
     side = np.where((leaves.normal * normal[group]).sum(axis=1) < 0, -1.0, 1.0)
@@ -149,7 +167,7 @@ def reduced_leaves(
     def corners(scale: float) -> FloatArray:
         return triangles_about(middle, axes, ratio, area * scale)
 
-    scale = unbiased(leaves, corners)
+    scale = unbiased(leaves, corners, rounds)
     positions = corners(scale * factor) * leaves.radius + leaves.center
     return Foliage(
         positions.reshape(-1, 3),
@@ -224,14 +242,14 @@ def triangles_about(
     return np.asarray(middle[:, None] + np.einsum("ca,ka,kai->kci", around, sizes, axes))
 
 
-def unbiased(leaves: Leaves, corners: Callable[[float], FloatArray]) -> float:
+def unbiased(leaves: Leaves, corners: Callable[[float], FloatArray], rounds: int = ROUNDS) -> float:
     """The scale of areas at which triangles cover as much as the leaves, seen from all sides.
 
     corners: of the triangles, (k, 3, 3), at a scale.
     """
     wanted = np.count_nonzero(rays_met(leaves.rays, leaves.found))
     scale = 1.0
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         found = np.count_nonzero(rays_met(leaves.rays, hits(leaves.rays, corners(scale))))
         scale *= (wanted + FEW) / (found + FEW)
     return scale

@@ -50,9 +50,17 @@ def grouped(
     is in one place.
     """
     size = max(float(np.sqrt(weight.sum() / count)), pixel)
-    looks = (normal[:, :, None] * shading[:, None]).reshape(-1, 9)
-    features = np.concatenate([middle, ORIENTATION * size * looks, COLOR * size * color], axis=1)
+    features = features_of(middle, normal, shading, color, size)
     return settled(features, weight, split(features, weight, count), count)
+
+
+def features_of(
+    middle: FloatArray, normal: FloatArray, shading: FloatArray, color: FloatArray, size: float
+) -> FloatArray:
+    """(n, 15) what leaves are grouped by, all (n, 3); size: side of the square that a group covers,
+    or of a pixel where that is larger."""
+    looks = (normal[:, :, None] * shading[:, None]).reshape(-1, 9)
+    return np.concatenate([middle, ORIENTATION * size * looks, COLOR * size * color], axis=1)
 
 
 def split(features: FloatArray, weight: FloatArray, count: int) -> Ints:
@@ -88,7 +96,17 @@ def halved(
     away = features - mean[group]
     along = np.einsum("nd,nd->n", away, widest(away, weight, first, group)[group])
     order = np.lexsort((along, group))
-    mass = weight[order]
+    return order, *parted(weight[order], total, first, wanted)
+
+
+def parted(mass: FloatArray, total: FloatArray, first: Ints, wanted: Ints) -> tuple[Ints, Ints]:
+    """Where halves of groups begin, and how many groups each is to become.
+
+    mass: (n,) weights of leaves, those of a group in the order in which they are parted. total:
+    (k,) of each group. first, wanted: (k,) as of `halved`.
+    """
+    size = np.diff(first, append=len(mass))
+    group = np.repeat(np.arange(len(first)), size)
     reached = np.cumsum(mass)
     before = np.append(0.0, reached)[first]
     share = (reached - mass / 2 - before[group]) / total[group]
@@ -98,7 +116,7 @@ def halved(
     cut = np.where(wanted > 1, np.maximum(np.add.reduceat(lower, first, dtype=np.int64), low), 0)
     begin = np.stack([first, first + cut], axis=1)
     halves = np.stack([low, wanted - low], axis=1)
-    return order, begin[halves > 0], halves[halves > 0]
+    return begin[halves > 0], halves[halves > 0]
 
 
 def widest(away: FloatArray, weight: FloatArray, first: Ints, group: Ints) -> FloatArray:
@@ -113,11 +131,13 @@ def widest(away: FloatArray, weight: FloatArray, first: Ints, group: Ints) -> Fl
     return np.asarray(direction)
 
 
-def settled(features: FloatArray, weight: FloatArray, group: Ints, count: int) -> Ints:
+def settled(
+    features: FloatArray, weight: FloatArray, group: Ints, count: int, rounds: int = ROUNDS
+) -> Ints:
     """Groups (n,) made such that nearly every leaf is nearest to its own group's mean."""
     from scipy.spatial import cKDTree
 
-    for _ in range(ROUNDS if count < len(group) else 0):
+    for _ in range(rounds if count < len(group) else 0):
         near = cKDTree(mean_of(features, weight, group, count)).query(features)[1]
         group = refilled(features, weight, np.unique(near, return_inverse=True)[1], count)
         if int(group.max()) + 1 < count:

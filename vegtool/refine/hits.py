@@ -39,17 +39,22 @@ class Rays:
         cells: int = CELLS,
         room: float = ROOM,
         half: bool = False,
+        views: FloatArray | None = None,
     ) -> Rays:
         """For triangles (f, 3, 3), whose bounds are not a point. room: of their extent, that a grid
-        shows. half: from above only, as does for outlines, which are the same from behind."""
+        shows. half: from above only, as does for outlines, which are the same from behind. views:
+        (d, 3) unit vectors towards viewers, in place of evenly spread ones."""
         low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+        middle, extent = (low + high) / 2, room * float(np.linalg.norm(high - low))
+        if views is not None:
+            return Rays(middle, extent, cells, views)
         nth = np.arange(directions)
         part = (nth + 0.5) / directions
         up = part if half else 1 - 2 * part
         turn = np.pi * nth * (5**0.5 - 1)
         across = np.sqrt(1 - up * up)
         views = np.stack([across * np.cos(turn), up, across * np.sin(turn)], axis=1)
-        return Rays((low + high) / 2, room * float(np.linalg.norm(high - low)), cells, views)
+        return Rays(middle, extent, cells, views)
 
     @property
     def cell(self) -> float:

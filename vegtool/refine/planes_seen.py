@@ -41,11 +41,16 @@ def seen(pieces: Pieces, surface: float, size: float, opacity: float) -> FloatAr
 
 
 def transmittances(
-    pieces: Pieces, surface: float, size: float, opacity: float
+    pieces: Pieces,
+    surface: float,
+    size: float,
+    opacity: float,
+    directions: FloatArray | None = None,
 ) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
     """For each of DIRECTIONS, (3,) unit in the plant's own frame, the shares (n,) and (n,) of light
-    that reach pieces from there and from the opposite one; arguments as of `seen`."""
-    for direction in even_directions(DIRECTIONS):
+    that reach pieces from there and from the opposite one; arguments as of `seen`. directions:
+    others, (d, 3) unit."""
+    for direction in even_directions(DIRECTIONS) if directions is None else directions:
         if size == 0:
             yield direction, np.ones(len(pieces)), np.ones(len(pieces))
             continue

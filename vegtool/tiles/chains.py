@@ -113,6 +113,7 @@ def joined(manifests: Sequence[Path]) -> Species:
             switch_m=np.concatenate([first.switch_m, more.switch_m[1:]]),
             fade=np.concatenate([first.fade, more.fade[1:]]),
             files=files,
+            error_m=np.concatenate([first.error_m, more.error_m[1:]]),
         )
     return first
 

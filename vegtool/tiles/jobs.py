@@ -25,7 +25,7 @@ from vegtool.errors import (
 from vegtool.formats import read_plant
 from vegtool.progress import Progress, silent
 from vegtool.scene import Scene
-from vegtool.tiles.journal import Entry, key_of, write_file
+from vegtool.tiles.journal import Entry, Hashed, key_of, write_file
 from vegtool.tiles.make import (
     Chosen,
     Tile,
@@ -326,7 +326,9 @@ def _far(world: World, job: FarJob) -> Iterator[Outcome]:
         return
     with timed(seconds, "quarters"):
         read = [(one, read_plant(world.out / file_of(one))) for one, _ in quarters]
-    tile = reclustered_tile(pyramid, node, read, sum(e.facts["plants"] for _, e in quarters))
+    plants = sum(entry.facts["plants"] for _, entry in quarters)
+    below_m = max(entry.facts["error_m"] or 0.0 for _, entry in quarters)
+    tile = reclustered_tile(pyramid, node, read, plants, below_m)
     yield _written(world, replace(tile, seconds={**seconds, **tile.seconds}), key)
 
 
@@ -365,9 +367,11 @@ def _stand_key(world: World, node: Node, stand: Stand, how: Chosen) -> str:
         if near
         else [_sheet_key(world, height), repr(pyramid.options.plain)]
     )
+    names = [one.name for one in pyramid.species]
+    told: list[Hashed] = [stand.row, *names] if pyramid.options.attributes else []
     return key_of(
         *drawn, stand.foot - pyramid.origin(node), stand.species, stand.scale, stand.yaw,
-        stand.tint, how.level,
+        stand.tint, how.level, *told,
     )  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import overload
@@ -60,8 +60,9 @@ class Species:
     levels: the original, then coarser and coarser; a tuple, or Stored. switch_m: (n,) metres, from
     where each may be used, 0 for the original, in pictures in which a metre at a distance of one is
     `focal_px` pixels. fade: (n,) share of that distance along which it replaces the one before.
-    files: where each was read. What is asked of all levels is read once, and kept when a species
-    goes to another process.
+    files: where each was read. error_m: (n,) metres, no more than which 95 % of each is from where
+    the original has it; NaN where nobody measured that. What is asked of all levels is read once,
+    and kept when a species goes to another process.
     """
 
     name: str
@@ -70,9 +71,14 @@ class Species:
     fade: FloatArray
     focal_px: float
     files: tuple[Path, ...]
+    error_m: FloatArray = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
         count = len(self.levels)
+        error = np.array(self.error_m) if self.error_m.size else np.full(count, np.nan)
+        if error.shape != (count,) or (error < 0).any():
+            raise ValueError("Species.error_m: expected a length for each level, or NaN")
+        object.__setattr__(self, "error_m", error)
         for name in ("switch_m", "fade"):
             value = checked(f"Species.{name}", getattr(self, name), (count,), np.float64)
             object.__setattr__(self, name, value)
@@ -184,4 +190,6 @@ def stored_species(path: Path) -> Species:
     np.divide(ends - distances, distances, out=fade, where=distances > 0)
     focal = shown.pixels_per_metre(1.0)
     stored = Stored(tuple(files))
-    return Species(told["name"], stored, distances, fade, focal, stored.files)
+    errors = [level["geometric_error_m"] for level in told["levels"]]
+    error = np.array([np.nan if one is None else one["p95"] for one in errors], np.float64)
+    return Species(told["name"], stored, distances, fade, focal, stored.files, error)

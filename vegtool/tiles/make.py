@@ -8,11 +8,17 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vegtool.arrays import FloatArray, IntArray
-from vegtool.formats.gltf import level_glb
-from vegtool.formats.gltf_tile import Instances, instanced_glb, merged_glb
+from vegtool.formats.gltf_tile import (
+    GroupPlants,
+    Instances,
+    far_glb,
+    instanced_glb,
+    merged_glb,
+)
+from vegtool.formats.plant_table import PlantTable
 from vegtool.plant import Plant
 from vegtool.tiles.levels import COARSEST, fitting
-from vegtool.tiles.merge import merged
+from vegtool.tiles.merge import merged, vertex_plants
 from vegtool.tiles.pyramid import Pyramid
 from vegtool.tiles.quadtree import Node
 from vegtool.tiles.shared import Shared
@@ -85,6 +91,7 @@ def instanced_tile(
             np.stack([stand.species, level], axis=1), axis=0, return_inverse=True
         )
         origin = pyramid.origin(node)
+        table = table_of(pyramid, stand)
         drawn = []
         for index, (kind, number) in enumerate(pair.tolist()):
             here = np.flatnonzero(which.ravel() == index)
@@ -95,12 +102,14 @@ def instanced_tile(
                     stand.yaw[here],
                     stand.scale[here],
                     stand.tint[here],
+                    None if table is None else table.only(here),
                 )
             )
         data = instanced_glb(drawn, str(node))
     triangles = int(pyramid.of_level[stand.species, level].sum())
+    error = error_of(pyramid, stand, level)
     draws = sum(len(one.model.objects["meshes"][0]["primitives"]) for one in drawn)
-    return Tile(node, data, "instances", len(stand), triangles, draws, 0.0, seconds=seconds)
+    return Tile(node, data, "instances", len(stand), triangles, draws, error, seconds=seconds)
 
 
 def merged_tile(
@@ -112,20 +121,47 @@ def merged_tile(
     with timed(seconds, "merging"):
         part = sheet.part[stand.species, level]
         group = merged(stand, part, sheet.sheet.parts, pyramid.origin(node))
+        table = table_of(pyramid, stand)
+        plants = None
+        if table is not None:
+            plants = GroupPlants(table, vertex_plants(part, sheet.sheet.parts))
     with timed(seconds, "writing"):
-        data = merged_glb(group, sheet.files, str(node), pyramid.options.plain)
-    return Tile(node, data, "merged", len(stand), len(group.indices) // 3, 1, seconds=seconds)
+        data = merged_glb(group, sheet.files, str(node), pyramid.options.plain, plants)
+    error = error_of(pyramid, stand, level)
+    triangles = len(group.indices) // 3
+    return Tile(node, data, "merged", len(stand), triangles, 1, error, seconds=seconds)
+
+
+def table_of(pyramid: Pyramid, stand: Stand) -> PlantTable | None:
+    """What is told of plants, where that is asked for."""
+    if not pyramid.options.attributes:
+        return None
+    own = np.array([one.height for one in pyramid.species])
+    height = (stand.scale * own[stand.species]).astype(np.float32)
+    names = tuple(one.name for one in pyramid.species)
+    return PlantTable(stand.row, stand.species, height, names)
+
+
+def error_of(pyramid: Pyramid, stand: Stand, level: IntArray) -> float | None:
+    """Metres: the largest error of a plant as its level draws it; None where none is known."""
+    error = pyramid.level_error_m[stand.species, level] * stand.scale
+    return None if np.isnan(error).all() else float(np.nanmax(error))
 
 
 def reclustered_tile(
-    pyramid: Pyramid, node: Node, quarters: Sequence[tuple[Node, Plant]], plants: int
+    pyramid: Pyramid,
+    node: Node,
+    quarters: Sequence[tuple[Node, Plant]],
+    plants: int,
+    below_m: float = 0.0,
 ) -> Tile:
     """What stands for the quarters, given as a client loads them, on which are so many plants.
+    below_m: how far these are off already.
 
     Raises CapabilityError where nothing can draw.
     """
     from vegtool.measure.pictures import client_plant
-    from vegtool.tiles.recluster import group_of, reclustered
+    from vegtool.tiles.recluster import drawing, group_of, reclustered
 
     tree, options = pyramid.tree, pyramid.options
     origin = pyramid.origin(node)
@@ -133,8 +169,11 @@ def reclustered_tile(
     group = group_of([plant for _, plant in quarters], places, str(node))
     away = pyramid.from_m(tree.height(node.level)) + SEEN_FROM * tree.side(node.level)
     level = reclustered(group, pyramid.budget(node), away, pyramid.display, options.max_texture)
-    error = None if level.geometric_error_m is None else level.geometric_error_m[1]
+    seconds = dict(level.seconds)
+    with timed(seconds, "writing"):
+        data = far_glb(*drawing(level), str(node), level.unlit, options.plain)
+    error = below_m + (0.0 if level.geometric_error_m is None else level.geometric_error_m[1])
     return Tile(
-        node, level_glb(level, str(node)), "reclustered", plants, level.triangles, 1, error,
-        client_plant(level).bounds + origin, dict(level.seconds),
+        node, data, "reclustered", plants, level.triangles, 1, error,
+        client_plant(level).bounds + origin, seconds,
     )  # fmt: skip

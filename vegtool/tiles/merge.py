@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from vegtool.arrays import FloatArray, IntArray
 from vegtool.lod import Triangles
@@ -43,6 +44,16 @@ def merged(
         joined("positions"), joined("normals"), joined("tangents"), joined("uvs"),
         np.concatenate(indices).astype(np.int32), joined("colors"),
     )  # fmt: skip
+
+
+def vertex_plants(part: IntArray, parts: Sequence[Triangles]) -> npt.NDArray[np.int64]:
+    """(v,) which plant, of those of a stand, each vertex of `merged` is of."""
+    return np.concatenate(
+        [
+            np.repeat(np.flatnonzero(part == index), len(parts[index].positions))
+            for index in np.unique(part)
+        ]
+    )
 
 
 def _repeated(stand: Stand, which: np.ndarray, part: Triangles, origin: FloatArray) -> Triangles:

@@ -15,18 +15,18 @@ class TileOptions:
     """How a landscape becomes tiles."""
 
     tile: float = option(
-        16.0, "Side of the smallest tiles in metres; each level above has twice that.", least=1.0,
+        32.0, "Side of the smallest tiles in metres; each level above has twice that.", least=1.0,
         most=4096.0,
     )  # fmt: skip
     near: int = option(
-        3, "Levels of the pyramid, from the smallest tiles on, whose plants are instances of "
+        2, "Levels of the pyramid, from the smallest tiles on, whose plants are instances of "
         "models that all tiles share; beyond, each tile is one mesh.", least=1, most=16,
     )  # fmt: skip
     triangles: int = option(
-        65_536, "Triangles of a merged tile, at most.", least=2, most=10_000_000
+        32_768, "Triangles of a merged tile, at most.", least=2, most=10_000_000
     )
     near_triangles: int = option(
-        131_072, "Triangles of a tile of instances, at most.", least=2, most=1_000_000_000
+        262_144, "Triangles of a tile of instances, at most.", least=2, most=1_000_000_000
     )
     near_texture: int = option(
         256, "Largest side of a texture of those models, in texels: clients keep a copy of it for "
@@ -35,6 +35,10 @@ class TileOptions:
     plain: bool = option(
         False, "Vertices of merged tiles as floats, for clients without KHR_mesh_quantization."
     )
+    attributes: bool = option(
+        False, "Write which plant is which, of what species and how high, for clients that ask "
+        "(EXT_structural_metadata)."
+    )  # fmt: skip
     max_texture: int = option(4096, "Largest side of a texture, in texels.", least=16, most=16384)
     format: str = option(
         "3dtiles",

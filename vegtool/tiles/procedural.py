@@ -40,6 +40,8 @@ SMALLEST, LARGEST = -5, 2
 tile of 4 periods has 65,536."""
 MOST_TILES = 4_000_000
 """Half a gigabyte of bounds."""
+AT_ONCE = 2**20
+"""Points of tiles on the edge that are looked at at a time."""
 CHUNK = 8192
 """Points that are tried at a time, where the first plants of a tile are asked for."""
 HALF = 2**24
@@ -236,12 +238,16 @@ def _counts(
             species = rules.species(points.rank)
             level = rules.level(points.rank, species)
             whole = here[~cut[here]]
+            grows, found = shares[whole].T, np.zeros(len(whole), dtype=np.int64)
             for kind in range(len(rules.tables)):
                 ordered = np.sort(level[species == kind])
-                counts[whole] += np.searchsorted(ordered, shares[whole, kind], side="left")
-            for tile in here[cut[here]]:
-                first = first_period(scale, int(column[tile]), int(row[tile]))
-                away = np.abs(points.place + first) - points.slack[:, None]
-                on = (away <= half).all(axis=1)
-                counts[tile] = np.count_nonzero(on & (level < shares[tile, species]))
+                found += np.searchsorted(ordered, grows[kind], side="left")
+            counts[whole] = found
+            at_once = max(AT_ONCE // len(points), 1)
+            for start in range(0, np.count_nonzero(cut[here]), at_once):
+                tiles = here[cut[here]][start : start + at_once]
+                first = np.floor(np.stack([column[tiles], row[tiles]], axis=1) * 2.0**scale)
+                away = np.abs(points.place + first[:, None]) - points.slack[:, None]
+                on = (away <= half).all(axis=2) & (level < shares[tiles][:, species])
+                counts[tiles] = np.count_nonzero(on, axis=1)
     return counts

@@ -70,12 +70,21 @@ class Pyramid:
         """(s, l) triangles."""
         return triangles(self.species)
 
+    @cached_property
+    def level_error_m(self) -> FloatArray:
+        """(s, l) metres, of plants of scale 1; NaN where it is not known, or there is no level."""
+        found = np.full(self.of_level.shape, np.nan)
+        for index, one in enumerate(self.species):
+            found[index, : len(one.levels)] = one.error_m
+        return found
+
     def digest(self, kind: int, level: int) -> str:
         """Of a species' level, and of where it may be used."""
         if (kind, level) not in self._digests:
             one = self.species[kind]
             found = blake2b(one.files[level].read_bytes(), digest_size=16)
-            found.update(repr((float(one.switch_m[level]), one.focal_px)).encode())
+            told = (float(one.switch_m[level]), float(one.error_m[level]), one.focal_px)
+            found.update(repr(told).encode())
             self._digests[kind, level] = found.hexdigest()
         return self._digests[kind, level]
 
