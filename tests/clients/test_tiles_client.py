@@ -200,7 +200,12 @@ def chosen(tileset: Tileset, eye: Eye) -> list[int]:
 def missing(folder: Path, eye: Eye) -> Path:
     """The last one of the tiles that are drawn: a small one, far away."""
     tileset = read_tileset(folder / "tileset.json")
-    return tileset.file[chosen(tileset, eye)[-1]]
+    return files_of(tileset)[chosen(tileset, eye)[-1]]
+
+
+def files_of(tileset: Tileset) -> list[Path]:
+    """Of its tiles, all of which have content."""
+    return [Path(file or "") for file in tileset.file]
 
 
 def tinted(folder: Path) -> None:
@@ -272,7 +277,7 @@ def test_the_client_draws_the_tiles_that_we_do(landscape: Visit, station: str) -
     there for us and not for it: not a pixel of those is in the picture, and either is right.
     """
     tileset, eye = read_tileset(landscape.folder / "tileset.json"), landscape.eyes[station]
-    numbers = {file: number for number, file in enumerate(tileset.file)}
+    numbers = {file: number for number, file in enumerate(files_of(tileset))}
     drawn = {numbers[landscape.folder / name] for name in landscape.stations[station]["drawn"]}
     ours = set(chosen(tileset, eye))
     assert drawn and not drawn - ours
@@ -287,12 +292,12 @@ def test_all_kinds_of_tiles_are_seen_on_the_way(landscape: Visit) -> None:
         name: {landscape.folder / file for file in station["drawn"]}
         for name, station in landscape.stations.items()
     }
-    assert seen["far above"] == {tileset.file[LANDSCAPE]}
+    assert seen["far above"] == {files_of(tileset)[LANDSCAPE]}
     kinds = {name: {kind(file) for file in files} for name, files in seen.items()}
     assert kinds["far above"] == {"reclustered"}
     assert kinds["far"] == {"merged"}
     assert kinds["near"] == {"instances", "merged"}
-    depths = [int(depth) for file, depth in zip(tileset.file, tileset.depth, strict=True)
+    depths = [int(depth) for file, depth in zip(files_of(tileset), tileset.depth, strict=True)
               if file in set.union(*seen.values())]  # fmt: skip
     assert set(depths) == {LANDSCAPE + level for level in range(4)}
 
@@ -381,7 +386,8 @@ def test_instances_have_colours_of_their_own(visits: dict[str, Visit]) -> None:
 def test_a_tile_that_is_missing_is_noticed(visits: dict[str, Visit], tiles: Path) -> None:
     """And leaves a gap, which nothing else fills."""
     visit = visits["broken"]
-    files = [file.relative_to(tiles) for file in read_tileset(tiles / "tileset.json").file]
+    whole_tileset = read_tileset(tiles / "tileset.json")
+    files = [file.relative_to(tiles) for file in files_of(whole_tileset)]
     (gone,) = (file.as_posix() for file in files if not (visit.folder / file).exists())
     ((file, message),) = visit.answer["failed"]
     assert file == gone and "404" in message
