@@ -32,7 +32,10 @@ MAY_IMPORT: dict[str, set[str]] = {
     "measure": {"gl", "lighting"},
     "baselines": {"formats", "baking", "gl", "measure"},
     "refine": {"branches", "clustering", "boxes", "gl", "baking", "lighting", "measure"},
-    "tiles": {"scene", "formats", "baking", "gl", "measure", "refine", "tangents"},
+    "tiles": {
+        "scene", "clustering", "boxes", "lighting", "formats", "baking", "gl", "measure", "refine",
+        "tangents",
+    },
     "convert": {"clustering", "boxes", "gl", "baking", "lighting", "measure", "refine"},
     "batch": {"convert", "formats", "measure"},
     "scene": {"convert", "lighting"},
