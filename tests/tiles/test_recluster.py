@@ -58,7 +58,8 @@ def made(group: Plant, triangles: int) -> Level:
 def small(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> bool:
     """Whether groups are drawn as triangles, whatever their size."""
     monkeypatch.setattr(recluster, "SMALL", request.param)
-    monkeypatch.setattr(recluster, "PIECES", 512)
+    monkeypatch.setattr(recluster, "LEAST_PIECES", 512)
+    monkeypatch.setattr(recluster, "MOST_PIECES", 512)
     monkeypatch.setattr(error, "SAMPLES", 2048)
     return bool(request.param)
 
