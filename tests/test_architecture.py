@@ -33,8 +33,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "baselines": {"formats", "baking", "gl", "measure"},
     "refine": {"branches", "clustering", "boxes", "gl", "baking", "lighting", "measure"},
     "tiles": {
-        "batch", "convert", "scene", "formats", "baking", "gl", "measure", "refine", "tangents",
-        "console", "workers",
+        "batch", "convert", "scene", "clustering", "boxes", "lighting", "formats", "baking", "gl",
+        "measure", "refine", "tangents", "console", "workers",
     },
     "convert": {"clustering", "boxes", "gl", "baking", "lighting", "measure", "refine"},
     "workers": set(),

@@ -40,8 +40,10 @@ window.visit = (folder, most, shares) => {
   tiles = new TilesRenderer(folder + 'tileset.json');
   tiles.errorTarget = ${error};
   const cache = tiles.lruCache;  // which all tilesets of a page have
-  usual ??= [cache.minBytesSize, cache.maxBytesSize];
-  [cache.minBytesSize, cache.maxBytesSize] = most ? [0, most] : usual;
+  const {minBytesSize, maxBytesSize, unloadPercent} = cache;
+  usual ??= {minBytesSize, maxBytesSize, unloadPercent};
+  const narrow = {minBytesSize: 0, maxBytesSize: most, unloadPercent: 1};
+  Object.assign(cache, most ? narrow : usual);
   if (shares) tiles.registerPlugin(new SharedTextures());
   tiles.addEventListener('load-error', ({url, error}) => failed.push([fileOf(url), error.message]));
   tiles.addEventListener('load-model', ({scene: model}) => model.traverse((node) => {

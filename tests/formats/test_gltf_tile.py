@@ -236,9 +236,7 @@ def test_writing_changes_nothing_and_is_the_same_again() -> None:
 # --------------------------------------------------------------------------- squares clustered anew
 
 OWN = OwnPictures(
-    np.stack(
-        [np.full((8, 16), value) for value in (70, 130, 45)] + [np.eye(8, 16) * 200], 2
-    ).astype(np.uint8),
+    np.full((8, 16, 4), [[[70, 130, 45, 200]], [[70, 130, 45, 20]]] * 4, np.uint8),
     np.full((8, 16, 3), (120, 140, 250), np.uint8),
 )
 

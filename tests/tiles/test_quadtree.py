@@ -91,6 +91,7 @@ def test_squares_are_where_tiles_are_row_by_row() -> None:
                 column, row = column // 2, row // 2
             wanted.add((row, column))
         assert tree.nodes(level) == [Node(level, c, r) for r, c in sorted(wanted)]
+        assert tree.count(level) == len(wanted)
     assert tree.nodes(0) == [Node(0, 0, 0)]
     assert len(tree.nodes(tree.depth)) == len(tree.cell), "the last level is that of the tiles"
 

@@ -58,7 +58,8 @@ def made(group: Plant, triangles: int) -> Level:
 def small(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> bool:
     """Whether groups are drawn as triangles, whatever their size."""
     monkeypatch.setattr(recluster, "SMALL", request.param)
-    monkeypatch.setattr(recluster, "PIECES", 512)
+    monkeypatch.setattr(recluster, "LEAST_PIECES", 512)
+    monkeypatch.setattr(recluster, "MOST_PIECES", 512)
     monkeypatch.setattr(error, "SAMPLES", 2048)
     return bool(request.param)
 
@@ -97,13 +98,13 @@ def test_the_error_is_in_metres_and_grows_as_triangles_get_fewer(small: bool) ->
 
 
 def test_it_covers_as_much_and_is_as_bright(small: bool) -> None:
-    """Seen as it is solved; 8 % is what so few leaves are apart by chance."""
+    """To a tenth, of 600 triangles seen by another filter than that by which they were solved."""
     group = square(600)
     level = made(group, 600)
     with PlantBuffers(group) as buffers:
         found = scores(looks(buffers, 2 * AWAY, DISPLAY), level).values
-    assert np.abs(found["coverage_bias"].mean()) < 0.08
-    assert np.abs(found["color_bias"].mean()) < 0.08
+    assert np.abs(found["coverage_bias"].mean()) < 0.1
+    assert np.abs(found["color_bias"].mean()) < 0.1
 
 
 def test_the_same_bytes_twice(small: bool) -> None:

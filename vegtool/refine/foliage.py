@@ -26,7 +26,7 @@ from vegtool.arrays import FloatArray, IntArray, unit
 from vegtool.plant import Plant
 from vegtool.refine.cutouts import cutouts
 from vegtool.refine.foliage_groups import grouped, mean_of
-from vegtool.refine.hits import Hits, Rays, distinct, hits, nearest, rays_met
+from vegtool.refine.hits import CELLS, Hits, Rays, distinct, hits, nearest, rays_met
 from vegtool.refine.mesh import ColoredMesh
 
 Ints = npt.NDArray[np.int64]
@@ -85,9 +85,12 @@ class Foliage(ColoredMesh):
     scale: float
 
 
-def leaves_of(plant: Plant, faces: IntArray, views: FloatArray | None = None) -> Leaves | None:
+def leaves_of(
+    plant: Plant, faces: IntArray, views: FloatArray | None = None, cells: int = CELLS
+) -> Leaves | None:
     """The leaves among a plant's faces, (k,) indices; None where they cover nothing. views: (d, 3)
-    unit vectors towards those who look; None for all around."""
+    unit vectors towards those who look; None for all around. cells: rays along the longest extent
+    that each sends."""
     if not len(faces):
         return None
     cut = cutouts(plant, faces)
@@ -101,7 +104,7 @@ def leaves_of(plant: Plant, faces: IntArray, views: FloatArray | None = None) ->
     corners = (corners[own] - center) / radius
     two_sided = np.array([m.double_sided for m in plant.materials], dtype=bool)
     both = np.asarray(two_sided[plant.face_material[faces[own]]])
-    rays = Rays.around(corners, views=views)
+    rays = Rays.around(corners, cells=cells, views=views)
     found = hits(rays, corners)
     shows = np.asarray(found.front | both[found.face])
     found = found.of(cut.covered(own[found.face], found.at) & shows)

@@ -55,12 +55,17 @@ def grouped(
 
 
 def features_of(
-    middle: FloatArray, normal: FloatArray, shading: FloatArray, color: FloatArray, size: float
+    middle: FloatArray,
+    normal: FloatArray,
+    shading: FloatArray,
+    color: FloatArray,
+    size: float,
+    orientation: float = ORIENTATION,
 ) -> FloatArray:
     """(n, 15) what leaves are grouped by, all (n, 3); size: side of the square that a group covers,
     or of a pixel where that is larger."""
     looks = (normal[:, :, None] * shading[:, None]).reshape(-1, 9)
-    return np.concatenate([middle, ORIENTATION * size * looks, COLOR * size * color], axis=1)
+    return np.concatenate([middle, orientation * size * looks, COLOR * size * color], axis=1)
 
 
 def split(features: FloatArray, weight: FloatArray, count: int) -> Ints:

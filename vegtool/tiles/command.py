@@ -109,9 +109,9 @@ def _crew(inputs: Inputs, world: World, run: RunOptions) -> Iterator[Each]:
 
 def _processes(world: World, run: RunOptions) -> int:
     """No more than there is work for."""
-    from vegtool.tiles.run import blocks
-
-    parts = len(run.only) or len(blocks(world.pyramid))
+    tree = world.pyramid.tree
+    top = min(world.pyramid.options.near, tree.depth)
+    parts = len(run.only) or tree.count(tree.depth - top)
     return min(run.jobs or os.cpu_count() or 1, parts)
 
 

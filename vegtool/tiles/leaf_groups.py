@@ -12,7 +12,7 @@ import numpy as np
 
 from vegtool.arrays import FloatArray
 from vegtool.refine.foliage import Leaves
-from vegtool.refine.foliage_groups import Ints, features_of, labels_of, parted, settled
+from vegtool.refine.foliage_groups import ORIENTATION, Ints, features_of, labels_of, parted, settled
 
 ROUNDS = 2
 """Of means and moves. With 4 a square of 65,536 triangles errs as much (FLIP)."""
@@ -22,9 +22,10 @@ ALMOST_ONE = 1 - 2.0**-20
 """The greatest place along a group's box, of which the group's number tells it apart."""
 
 
-def leaf_groups(leaves: Leaves, count: int, pixel: float) -> Ints:
+def leaf_groups(leaves: Leaves, count: int, pixel: float, orientation: float = ORIENTATION) -> Ints:
     """(n,) labels 0 to at most count - 1 of n leaves, each of which some leaf has; no more than
-    there are leaves. pixel: what one covers, in radii; what is nearer than that is in one place."""
+    there are leaves. pixel: what one covers, in radii; what is nearer than that is in one place.
+    orientation: as of refine/foliage_groups.py."""
     count = min(count, len(leaves))
     weight = leaves.weight
     size = max(float(np.sqrt(weight.sum() / count)), pixel)
@@ -37,7 +38,7 @@ def leaf_groups(leaves: Leaves, count: int, pixel: float) -> Ints:
         stop = min(start + BLOCK, count)
         own = order[ends[start] : ends[stop]]
         look = leaves.normal[own], leaves.shading[own], leaves.color[own]
-        features = features_of(leaves.middle[own], *look, size).astype(np.float32)
+        features = features_of(leaves.middle[own], *look, size, orientation).astype(np.float32)
         group = settled(features, weight[own], label[own] - start, stop - start, ROUNDS)  # type: ignore[arg-type]
         result[own] = group + found
         found += int(group.max()) + 1

@@ -77,6 +77,11 @@ class Quadtree:
         found = np.unique((self.cell >> self.height(level))[:, ::-1], axis=0)
         return [Node(level, int(column), int(row)) for row, column in found]
 
+    def count(self, level: int) -> int:
+        """How many squares of a level there are."""
+        codes = self._sorted[0] >> (2 * self.height(level))
+        return 1 + int(np.count_nonzero(np.diff(codes)))
+
     def tiles_of(self, node: Node) -> LongArray:
         """(n,) the placement's tiles on a square, ascending; none where it is not there."""
         codes, tiles = self._sorted

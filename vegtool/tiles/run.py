@@ -68,7 +68,7 @@ class Run:
         self.found: dict[str, Entry] = {}
         self.failed: dict[str, Failed] = {}
         self._known = read_journal(world.out)
-        self._done, self._all = 0.0, _cost(world.pyramid)
+        self._done, self._all = 0.0, 0.0
 
     def tiles(self) -> Iterator[Outcome]:
         """Make all parts, and yield what comes of each.
@@ -77,6 +77,7 @@ class Run:
         """
         pyramid, out = self.world.pyramid, self.world.out
         tree, top = pyramid.tree, _top(pyramid)
+        self._all = _cost(pyramid)
         clean(out)
         with appended(out) as write:
             yield from self._do(models(pyramid), write)
@@ -110,6 +111,7 @@ class Run:
             jobs.append(
                 FarJob(node=node, quarters=tuple((q, self._known[str(q)]) for q in quarters))
             )
+        self._all = sum(COST[type(job)] for job in jobs)
         clean(self.world.out)
         with appended(self.world.out) as write:
             yield from self._do(jobs, write)
@@ -218,10 +220,10 @@ def blocks(pyramid: Pyramid) -> list[BlockJob]:
 def _cost(pyramid: Pyramid) -> float:
     """Of all jobs."""
     tree, top = pyramid.tree, _top(pyramid)
-    far = sum(len(tree.nodes(level)) for level in range(tree.depth - top))
+    far = sum(tree.count(level) for level in range(tree.depth - top))
     return (
         COST[ModelJob] * len(models(pyramid))
-        + COST[BlockJob] * len(blocks(pyramid))
+        + COST[BlockJob] * tree.count(tree.depth - top)
         + COST[FarJob] * far
         + COST[SheetJob]
     )

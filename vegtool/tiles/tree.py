@@ -19,6 +19,10 @@ from vegtool.tiles.journal import Entry
 from vegtool.tiles.pyramid import Pyramid
 from vegtool.tiles.quadtree import Node
 
+ABOVE = 1.001
+"""Of its quarters' errors, how much greater a square's is at least: where they are the same, some
+clients take the quarter for one that is never to be drawn, and go on to its own."""
+
 
 def tree_of(pyramid: Pyramid, found: Mapping[str, Entry]) -> TileEntry | None:
     """The tiles that were made, from the root on; None where there are no plants on any."""
@@ -44,7 +48,12 @@ def _entry(pyramid: Pyramid, node: Node, found: Mapping[str, Entry]) -> TileEntr
         None if own is None else file_of(node),
         pyramid.origin(node),
         np.stack([np.min([b[0] for b in bounds], axis=0), np.max([b[1] for b in bounds], axis=0)]),
-        max(pyramid.error_m(tree.height(node.level)), measured, *(c.error_m for c in below), 0.0),
+        max(
+            pyramid.error_m(tree.height(node.level)),
+            measured,
+            *(ABOVE * c.error_m for c in below),
+            0.0,
+        ),
         sum(c.plants for c in below) if own is None else own.facts["plants"],
         (float(tiles.low[which, 1].min()), float(tiles.high[which, 1].max())),
         children,
