@@ -98,13 +98,13 @@ def test_the_error_is_in_metres_and_grows_as_triangles_get_fewer(small: bool) ->
 
 
 def test_it_covers_as_much_and_is_as_bright(small: bool) -> None:
-    """Seen as it is solved; 8 % is what so few leaves are apart by chance."""
+    """To a tenth, of 600 triangles seen by another filter than that by which they were solved."""
     group = square(600)
     level = made(group, 600)
     with PlantBuffers(group) as buffers:
         found = scores(looks(buffers, 2 * AWAY, DISPLAY), level).values
-    assert np.abs(found["coverage_bias"].mean()) < 0.08
-    assert np.abs(found["color_bias"].mean()) < 0.08
+    assert np.abs(found["coverage_bias"].mean()) < 0.1
+    assert np.abs(found["color_bias"].mean()) < 0.1
 
 
 def test_the_same_bytes_twice(small: bool) -> None:

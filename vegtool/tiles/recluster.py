@@ -44,10 +44,12 @@ from vegtool.timing import timed
 
 SMALL = 5.0
 """Pixels: side of a square as large as what is seen of the leaves for each triangle, up to which
-opaque triangles show a square better than pictures do."""
+they are opaque. On a square of 205 m, 65,536 triangles (2.9) err by 0.099 (FLIP) and 32,768 (4.2)
+by 0.129, in 4 s and 4 and 2 MB; 16,384 (5.9) by 0.169, and with pictures, in 13 s and 8 MB, by
+0.116; 4,096 (12) by 0.226, and with pictures, in 9 s and 5 MB, by 0.161."""
 DENSITY = 0.42
-"""Texels per pixel, where a square is seen from nearest. With 1 it errs as much (FLIP), and has
-eight times the texels."""
+"""Texels per pixel, where a square is seen from nearest. With 1 it errs by 1 % less (FLIP), and has
+five times the texels."""
 SUPERSAMPLE = 2
 """Samples per axis and texel."""
 ORIENTATION = 4.0
