@@ -28,7 +28,7 @@ from landscape import tables
 from landscape.making import Made, command, merging, single
 from landscape.rebaked import compared
 from landscape.scenes import PLANTS, SIDE_M, library, scene
-from landscape.stations import seen
+from landscape.stations import STATIONS, seen
 from recorded import record, written
 from walk.speed import alone
 
@@ -54,6 +54,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--parts", default=",".join(PARTS))
     parser.add_argument("--cache", type=Path, default=Path("/tmp/vegtool-tiles"))
+    parser.add_argument("--stations", default=",".join(s.name for s in STATIONS))
     parser.add_argument("--record", action="store_true")
     parser.add_argument("--markdown", action="store_true")
     parser.add_argument("--figures", type=Path)
@@ -92,7 +93,10 @@ def main() -> int:
         rebaked = compared(world_of(Inputs(scene(cache, PLANTS), plants, tiles, options)))
         told("rebaked", tables.compared_rows(rebaked))
     if "error" in parts:
-        stations = seen(tiles, scene(cache, PLANTS), plants, SIDE_M, cache, cache / "pictures")
+        wanted = [one for one in STATIONS if one.name in given.stations.split(",")]
+        stations = seen(
+            tiles, scene(cache, PLANTS), plants, SIDE_M, cache, cache / "pictures", wanted
+        )
         told("error", tables.seen_rows(stations))
     if given.record:
         machine = {"version": __version__, "renderer": describe().renderer, "cores": os.cpu_count()}

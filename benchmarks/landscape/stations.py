@@ -8,6 +8,7 @@ pixel (walk/truth.py), and kept.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import atan, degrees, radians, tan
 from pathlib import Path
@@ -78,9 +79,10 @@ class Seen:
 
 
 def seen(
-    tiles: Path, scene: Path, library: Path, side_m: float, cache: Path, pictures: Path | None
-) -> list[Seen]:
-    """All stations. pictures: folder for the truth and what was drawn, side by side."""
+    tiles: Path, scene: Path, library: Path, side_m: float, cache: Path, pictures: Path | None,
+    stations: Sequence[Station] = STATIONS,
+) -> list[Seen]:  # fmt: skip
+    """Stations. pictures: folder for the truth and what was drawn, side by side."""
     found, shown = [], read_tile_world(tiles / "tileset.json")
     facts = {
         Path(file).name: entry.facts
@@ -90,7 +92,7 @@ def seen(
     with forest:
         for _ in forest.load():
             pass
-        for station in STATIONS:
+        for station in stations:
             eye = station.eye(side_m)
             forest.picture(eye, SIZE, Look())  # loads what is not there yet
             started = perf_counter()
