@@ -101,7 +101,7 @@ def seen(
             drawn = forest.choose(eye, SIZE, Look())
             truth = _truth(eye, station, scene, library, cache)
             flip = float(difference(perceived(over(truth)), perceived(over(picture))).mean())
-            told = [facts[shown.tileset.file[tile].name] for tile in drawn]
+            told = [facts[Path(str(shown.tileset.file[tile])).name] for tile in drawn]
             kinds = Counter(one["kind"] for one in told)
             found.append(
                 Seen(
