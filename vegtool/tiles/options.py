@@ -26,7 +26,7 @@ class TileOptions:
         32_768, "Triangles of a merged tile, at most.", least=2, most=10_000_000
     )
     near_triangles: int = option(
-        262_144, "Triangles of a tile of instances, at most.", least=2, most=1_000_000_000
+        524_288, "Triangles of a tile of instances, at most.", least=2, most=1_000_000_000
     )
     near_texture: int = option(
         256, "Largest side of a texture of those models, in texels: clients keep a copy of it for "
