@@ -413,7 +413,11 @@ def tiles_command(
     jobs: Annotated[
         int | None,
         typer.Option(
-            "-j", "--jobs", help="Processes [one to each core].", min=1, show_default=False
+            "-j",
+            "--jobs",
+            help="Processes; one to each core, unless told.",
+            min=1,
+            show_default=False,
         ),
     ] = None,
     dask: Annotated[
