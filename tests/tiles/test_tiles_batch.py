@@ -18,7 +18,7 @@ from typing import Any
 import pytest
 import test_tiles_run
 from plant_tables import columns
-from test_tiles_run import COUNT, HIGH, PLACED, files, inventory, library, pyramid, world
+from test_tiles_run import COUNT, HIGH, PLACED, files, inventory, library
 from tile_cases import TWO_SPECIES, scene_of
 
 from vegtool.errors import OutputError, UsageError
@@ -27,7 +27,7 @@ from vegtool.formats.tileset_check import check_tileset
 from vegtool.seeding import generator
 from vegtool.tiles import jobs as jobs_module
 from vegtool.tiles.command import Result, run_tiles
-from vegtool.tiles.jobs import Failed, Inputs, Made, ModelJob, do_at, file_of, world_of
+from vegtool.tiles.jobs import Inputs, Made, ModelJob, do_at, file_of, world_of
 from vegtool.tiles.journal import JOURNAL, Entry, appended, key_of, read_journal, write_journal
 from vegtool.tiles.options import RunOptions, TileOptions
 from vegtool.tiles.quadtree import Node
@@ -528,8 +528,3 @@ def test_keys_tell_values_apart() -> None:
     for one, other in pairs:
         assert key_of(*one) != key_of(*other)
         assert key_of(*one) == key_of(*one)
-
-
-def test_failures_are_told_by_their_own_exit_code() -> None:
-    assert Failed("1/0/0", "why").exit_code == 1
-    assert world is not None and pyramid is not None

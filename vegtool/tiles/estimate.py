@@ -21,7 +21,7 @@ from vegtool.tiles.shared import Shared
 FAR_S = 5.0
 """Seconds of one core for a square of 65,536 triangles that is clustered anew."""
 FAR_TRIANGLES = 65_536
-FAR_BYTES = 26.0
+FAR_BYTES = 60.0
 """Bytes of such a square for each triangle."""
 
 
