@@ -25,7 +25,8 @@ def read(path: Path) -> Table:
 
     Coordinates are longitude and latitude, as the standard says, unless the file names another
     coordinate system (`crs`, of the standard's 2008 version) or they cannot be degrees.
-    Raises InputError for a file that is broken, and for features that are no points.
+    Raises InputError for a file that is broken, for features that are no points, and for
+    properties that have no names.
     """
     try:
         document = json.loads(path.read_bytes())
@@ -41,7 +42,7 @@ def read(path: Path) -> Table:
     points = [_coordinates(path, row, feature) for row, feature in enumerate(features, start=1)]
     axes = min(map(len, points))
     given = {name: index for index, name in enumerate(list(COORDINATES)[: min(axes, 3)])}
-    properties = [feature.get("properties") or {} for feature in features]
+    properties = [_properties(path, row, feature) for row, feature in enumerate(features, start=1)]
     named = list(dict.fromkeys(name for each in properties for name in each))
     names = (*(COORDINATES[axis] for axis in given), *named)
 
@@ -52,7 +53,7 @@ def read(path: Path) -> Table:
                 columns.append([point[index] for point in points])
             else:
                 name = named[index - len(given)]
-                columns.append([each.get(name) for each in properties])
+                columns.append([_value(each.get(name)) for each in properties])
         yield tuple(columns)
 
     notes: tuple[str, ...] = ()
@@ -94,3 +95,19 @@ def _coordinates(path: Path, row: int, feature: Any) -> list[float]:
             f"{json.dumps(position):.60}; correct or remove it"
         )
     return position
+
+
+def _properties(path: Path, row: int, feature: dict[str, Any]) -> dict[str, Any]:
+    """What a feature is told to be, by name; nothing where that is null."""
+    found = feature.get("properties")
+    if found is not None and not isinstance(found, dict):
+        raise InputError(
+            f"{path}, feature {row:,}: expected properties with names, found "
+            f"{json.dumps(found):.60}; correct or remove it"
+        )
+    return found or {}
+
+
+def _value(found: Any) -> Value:
+    """A property; one of several values is none that an inventory can have, and told as text."""
+    return json.dumps(found) if isinstance(found, list | dict) else found
