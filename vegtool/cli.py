@@ -463,11 +463,13 @@ def tiles_command(
         console.say(f"error: {one.message}", at=-1)
         console.say(one.trace, at=2)
     console.result(result.facts, result.text)
-    if result.failed:
+    if result.exit_code == BatchError.exit_code:
         raise BatchError(
-            f"{len(result.failed):,} tiles could not be made; the others are there, and the same "
+            f"{len(result.failed):,} parts could not be made; the others are there, and the same "
             "command tries again"
         )
+    if result.exit_code:
+        raise typer.Exit(result.exit_code)
 
 
 @app.command("doctor")

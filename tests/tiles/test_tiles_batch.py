@@ -21,7 +21,8 @@ from plant_tables import columns
 from test_tiles_run import COUNT, HIGH, PLACED, files, inventory, library
 from tile_cases import TWO_SPECIES, scene_of
 
-from vegtool.errors import OutputError, UsageError
+from vegtool.cli import run as main
+from vegtool.errors import OutputError, UsageError, VegtoolError
 from vegtool.formats.gltf_data import open_gltf
 from vegtool.formats.tileset_check import check_tileset
 from vegtool.seeding import generator
@@ -29,9 +30,11 @@ from vegtool.tiles import jobs as jobs_module
 from vegtool.tiles.command import Result, run_tiles
 from vegtool.tiles.jobs import Inputs, Made, ModelJob, do_at, file_of, world_of
 from vegtool.tiles.journal import JOURNAL, Entry, appended, key_of, read_journal, write_journal
+from vegtool.tiles.make import merged_tile
 from vegtool.tiles.options import RunOptions, TileOptions
 from vegtool.tiles.quadtree import Node
 from vegtool.tiles.run import Run
+from vegtool.tiles.shared import Shared
 from vegtool.workers import Alone, Processes
 
 OPTIONS = TileOptions(tile=16.0, near=1, triangles=400)
@@ -337,6 +340,30 @@ def test_a_square_that_cannot_be_made_leaves_its_quarters(
     assert file_of(lost) not in text
     for one in world_of(of).pyramid.tree.quarters(lost):
         assert file_of(one) in text
+
+
+def test_a_model_that_cannot_be_made_is_told_of_by_the_tiles_that_draw_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It is no bug of theirs. Where no tile is left, the exit status is that of what went wrong."""
+    of = inputs(tmp_path)
+
+    def broken(*given: Any) -> Any:
+        raise MemoryError
+
+    monkeypatch.setattr(Shared, "model_files", broken)
+    monkeypatch.setattr(jobs_module, "merged_tile", broken)
+    words = command(of, "-j", "1")[3:]
+    assert main(words) == 1
+    said = capsys.readouterr().err
+    assert "error: model 0/0: not enough memory; fewer processes (-j) need less" in said
+    assert "expected" in said and "ash_0.gltf, which it draws, found none" in said
+    assert "the others are there" not in said and "Traceback" not in said
+    monkeypatch.setattr(jobs_module, "merged_tile", merged_tile)
+    assert main(words) == 3
+    assert "the others are there" in capsys.readouterr().err
+    with pytest.raises(VegtoolError, match="model 0/0: not enough memory"):
+        run(replace(of, out=tmp_path / "dry"), RunOptions(1, dry_run=True))
 
 
 def test_a_full_disk_ends_the_run_which_goes_on_later(

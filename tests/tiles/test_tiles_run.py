@@ -553,9 +553,14 @@ def test_a_merged_plant_without_a_height_is_no_other_plant(tmp_path: Path) -> No
 
 def test_plants_of_one_name_keep_their_files() -> None:
     """Also where a file system takes capitals for small letters, or a name is none for files."""
-    names = file_names(["oak", "Oak", "o k", "o_k", "pine"])
-    assert len({plain_name(name).lower() for name in names}) == 5
-    assert names[-1] == "pine", "those that differ anyway keep their names"
+    for given in (
+        ["oak", "Oak", "o k", "o_k", "pine"],
+        ["oak", "Oak", "oak_1", "pine"],  # as the second could be called
+        ["oak", "oak", "oak_0", "Oak_0", "oak_0_2", "pine"],
+    ):
+        names = file_names(given)
+        assert len({plain_name(name).lower() for name in names}) == len(given)
+        assert names[-1] == "pine", "those that differ anyway keep their names"
 
 
 def test_sides_count(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-from vegtool.errors import OutputError, UsageError
+from vegtool.errors import BatchError, OutputError, UsageError
 from vegtool.progress import Progress
 from vegtool.tiles.options import RunOptions, TileOptions
 
@@ -25,8 +25,8 @@ Bar = Callable[[str], AbstractContextManager[Progress]]
 
 @dataclass(frozen=True)
 class Result:
-    """facts: for machines. text: for people. failed: parts that could not be made. exit_code: 3
-    where some were made."""
+    """facts: for machines. text: for people. failed: parts that could not be made. exit_code: that
+    of BatchError where others were made."""
 
     facts: dict[str, Any]
     text: str
@@ -80,9 +80,9 @@ def _made(
     files = [] if only else work.finish()
     facts = facts_of(world, made, work.failed, out, files, perf_counter() - started)
     failed = tuple(work.failed.values())
-    if failed and not any(one.entry.facts for one in made):
+    if failed and not any(one.entry.facts.get("plants") for one in made):
         return Result(facts, "", failed, failed[0].exit_code)
-    return Result(facts, text_of(facts), failed, 3 if failed else 0)
+    return Result(facts, text_of(facts), failed, BatchError.exit_code if failed else 0)
 
 
 @contextmanager

@@ -211,6 +211,11 @@ def name_of(job: Job) -> str:
     return str(job.node)
 
 
+def called(name: str) -> str:
+    """A part in a sentence for the user: tile 3/0/1, model 0/2, sheet 2."""
+    return f"tile {name}" if name[0].isdigit() else name
+
+
 def nodes_of(tree: Quadtree, node: Node) -> list[Node]:
     """A square and all on it, the smallest first."""
     levels = [[node]]
@@ -220,11 +225,12 @@ def nodes_of(tree: Quadtree, node: Node) -> list[Node]:
 
 
 def _failed(name: str, error: Exception) -> Failed:
+    what = called(name)
     if isinstance(error, VegtoolError):
-        return Failed(name, f"tile {name}: {error}", error.exit_code)
+        return Failed(name, f"{what}: {error}", error.exit_code)
     if isinstance(error, MemoryError):
-        return Failed(name, f"tile {name}: not enough memory; fewer processes (-j) need less")
-    return Failed(name, f"tile {name}: {unknown(error)}", trace=traceback.format_exc())
+        return Failed(name, f"{what}: not enough memory; fewer processes (-j) need less")
+    return Failed(name, f"{what}: {unknown(error)}", trace=traceback.format_exc())
 
 
 def _model(world: World, job: ModelJob) -> Iterator[Outcome]:

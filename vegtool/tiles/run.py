@@ -27,6 +27,7 @@ from vegtool.tiles.jobs import (
     SheetJob,
     TileJob,
     World,
+    called,
     do,
     name_of,
     nodes_of,
@@ -149,7 +150,7 @@ class Run:
     def _do(self, jobs: Sequence[Job], write: Callable[[Entry], None]) -> Iterator[Outcome]:
         for job, outcomes in self.each([self._knowing(job) for job in jobs]):
             name = name_of(job)
-            for outcome in outcomes or [Failed(name, f"{name}: {LOST}")]:
+            for outcome in outcomes or [Failed(name, f"{called(name)}: {LOST}")]:
                 if isinstance(outcome, Failed):
                     self.failed[outcome.name] = outcome
                 else:

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from vegtool.arrays import FloatArray, IntArray
+from vegtool.errors import InputError
 from vegtool.formats import png
 from vegtool.formats.gltf_tile import SheetFiles
 from vegtool.formats.shared_model import SharedModel, model_files, plain_name, read_shared
@@ -67,10 +68,18 @@ class Shared:
         return model_files(plant, self.model_name(kind, level))
 
     def model(self, kind: int, level: int) -> SharedModel:
-        """A level whose files are written, as instances refer to it."""
+        """A level whose files are written, as instances refer to it.
+
+        Raises InputError where they are not.
+        """
         if (kind, level) not in self._models:
             file = self.folder / FOLDER / f"{plain_name(self.model_name(kind, level))}.gltf"
-            self._models[kind, level] = read_shared(file, f"{FOLDER}/")
+            try:
+                self._models[kind, level] = read_shared(file, f"{FOLDER}/")
+            except FileNotFoundError as error:
+                raise InputError(
+                    f"expected {file}, which it draws, found none: that could not be made"
+                ) from error
         return self._models[kind, level]
 
     def crowded(self, height: int) -> float:
@@ -130,7 +139,13 @@ class Shared:
 def file_names(names: Sequence[str]) -> list[str]:
     """Names that no two have, whatever the file system thinks of capitals."""
     plain = [plain_name(name).lower() for name in names]
-    return [
-        name if plain.count(own) == 1 else f"{name}_{index}"
-        for index, (name, own) in enumerate(zip(names, plain, strict=True))
-    ]
+    taken = {own for own in plain if plain.count(own) == 1}
+    found = []
+    for index, (name, own) in enumerate(zip(names, plain, strict=True)):
+        if plain.count(own) > 1:
+            name = f"{name}_{index}"
+            while plain_name(name).lower() in taken:
+                name += "_"
+            taken.add(plain_name(name).lower())
+        found.append(name)
+    return found
