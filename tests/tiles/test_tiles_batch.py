@@ -156,8 +156,9 @@ def test_a_scheduler_that_is_none_is_a_sentence(whole: Whole, tmp_path: Path) ->
     of = replace(whole[0], out=tmp_path / "none")
     with pytest.raises(UsageError, match="--dask no: expected a Dask scheduler, found none that"):
         run(of, RunOptions(dask="no"))
+    missing = replace(of, scene=tmp_path / "none.toml")  # it is said before anything is read
     with pytest.raises(UsageError, match="--dask: is in place of processes here; leave out -j"):
-        run(of, RunOptions(2, "tcp://127.0.0.1:9"))
+        run(missing, RunOptions(2, "tcp://127.0.0.1:9"))
 
 
 def test_who_sees_other_files_says_so(tmp_path: Path) -> None:
@@ -412,18 +413,40 @@ def test_a_folder_of_others_is_not_written_over(whole: Whole, tmp_path: Path) ->
         run(replace(inside, scene=within), RunOptions(1, force=True))
 
 
+def test_a_run_goes_on_in_the_folder_of_its_scene(tmp_path: Path) -> None:
+    """What is there is its own. The scene itself is not, whatever it is called."""
+    of = replace(inputs(tmp_path), out=tmp_path)
+    assert not run(of).failed
+    assert run(of).facts["made"] == 0
+    points = of.scene.with_name("index.json")
+    points.write_text("{}")
+    of = replace(of, scene=points, options=replace(of.options, format="glb"))
+    with pytest.raises(OutputError, match=r"index\.json: is where tiles are to go, and .* is there"):
+        run(of, RunOptions(1, force=True))
+
+
 # --------------------------------------------------------------------------------- parts of it all
 
 
 def test_a_tile_alone_is_as_with_all_others(whole: Whole, tmp_path: Path) -> None:
-    """With the models that it draws, and no tileset."""
+    """With the models and the sheet that it draws, and no tileset; what another process is writing
+    there stays."""
     of, wanted = whole
     of = replace(of, out=tmp_path / "out")
+    other = of.out / "tiles" / ".5_0_0.glb.0123.part"
+    other.parent.mkdir(parents=True)
+    other.write_bytes(b"half")
     tree = world_of(of).pyramid.tree
     leaf, square = tree.nodes(tree.depth)[5], tree.nodes(tree.depth - 1)[0]
-    result = run(of, RunOptions(1, only=(str(leaf), str(square))))
+    result = run(of, RunOptions(1, only=(str(leaf), str(square)), force=True))
+    other.unlink()
     there = files(of.out)
     assert result.facts["tileset"] is None and len(result.facts["tiles"]) == 2
+    for node in (leaf, square):
+        tile = of.out / file_of(node)
+        uris = [one["uri"] for kind in ("buffers", "images")
+                for one in open_gltf(tile).json.get(kind, []) if "uri" in one]  # fmt: skip
+        assert uris and all((tile.parent / uri).exists() for uri in uris)
     assert {file_of(leaf), file_of(square)} <= set(there) and "tileset.json" not in there
     assert all(wanted[name] == data for name, data in there.items() if name != JOURNAL)
     assert len(there) < len(wanted)

@@ -46,6 +46,8 @@ def run_tiles(
     from vegtool.tiles.jobs import Inputs, world_of
 
     started = perf_counter()
+    if run.dask is not None and run.jobs is not None:
+        raise UsageError("--dask: is in place of processes here; leave out -j")
     inputs = Inputs(scene.absolute(), library.absolute(), out.absolute(), options)
     _check_out(inputs, run.force)
     with bar("reading") as progress:
@@ -92,8 +94,6 @@ def _crew(inputs: Inputs, world: World, run: RunOptions) -> Iterator[Each]:
     from vegtool.workers import Alone, Processes
 
     if run.dask is not None:
-        if run.jobs is not None:
-            raise UsageError("--dask: is in place of processes here; leave out -j")
         from vegtool.tiles.cluster import Cluster
 
         with Cluster(run.dask) as cluster:
@@ -124,13 +124,14 @@ def _check_out(inputs: Inputs, force: bool) -> None:
 
     own = (inputs.out / JOURNAL).exists()
     begin = BEGINS[inputs.options.format]
-    check_free(inputs.out, [begin, JOURNAL], force or own, (inputs.scene, inputs.library / begin))
+    beside = () if own else (inputs.scene, inputs.library / begin)
+    check_free(inputs.out, [begin, JOURNAL], force or own, beside)
     for path in (inputs.scene, inputs.library):
-        if path.resolve().is_relative_to((inputs.out / TILES).resolve()):
-            raise OutputError(
-                f"{inputs.out / TILES}: is where tiles are to go, and {path} is in it. Choose "
-                "another place."
-            )
+        for place in (inputs.out / TILES, inputs.out / begin):
+            if path.resolve().is_relative_to(place.resolve()):
+                raise OutputError(
+                    f"{place}: is where tiles are to go, and {path} is there. Choose another place."
+                )
     if not own and not force and (inputs.out / TILES).exists():
         raise OutputError(
             f"{inputs.out / TILES}: exists already, and no run of vegtool tiles says that it made "

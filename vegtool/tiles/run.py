@@ -87,12 +87,11 @@ class Run:
                 nodes = tree.nodes(tree.depth - height)
                 if height > top:
                     yield from self._do([self._far(node) for node in nodes], write)
-                entries = (self.found.get(str(node)) for node in nodes)
-                if any(entry and entry.facts.get("kind") == "merged" for entry in entries):
-                    yield from self._do([SheetJob(height=height)], write)
+                yield from self._do(self._sheets(nodes), write)
 
     def only(self, nodes: Sequence[Node]) -> Iterator[Outcome]:
-        """Make some tiles, with the models that they draw, and nothing else.
+        """Make some tiles, with the models and the sheets that they draw, and nothing else; others
+        may be at work in the same folder.
 
         Raises UsageError for one that is made of quarters which are not there.
         """
@@ -113,9 +112,9 @@ class Run:
                 FarJob(node=node, quarters=tuple((q, self._known[str(q)]) for q in quarters))
             )
         self._all = sum(COST[type(job)] for job in jobs)
-        clean(self.world.out)
         with appended(self.world.out) as write:
             yield from self._do(jobs, write)
+            yield from self._do(self._sheets(nodes), write)
         self.progress("tiles", 1.0)
 
     def finish(self) -> list[str]:
@@ -146,6 +145,16 @@ class Run:
         self._forget()
         write_journal(out, self.found)
         return names
+
+    def _sheets(self, nodes: Sequence[Node]) -> list[SheetJob]:
+        """What tiles that were made are drawn with, where any is merged."""
+        tree, entries = self.world.pyramid.tree, self.found
+        merged = {
+            tree.height(node.level)
+            for node in nodes
+            if str(node) in entries and entries[str(node)].facts.get("kind") == "merged"
+        }
+        return [SheetJob(height=height) for height in sorted(merged)]
 
     def _do(self, jobs: Sequence[Job], write: Callable[[Entry], None]) -> Iterator[Outcome]:
         for job, outcomes in self.each([self._knowing(job) for job in jobs]):

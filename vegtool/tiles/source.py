@@ -9,10 +9,8 @@ from vegtool.formats import READERS
 from vegtool.scene import PlacementTable, Scene, read_scene
 from vegtool.tiles.library import MANIFEST
 from vegtool.tiles.named import TABLES, library_at
+from vegtool.tiles.rows import READERS as INVENTORIES
 from vegtool.tiles.species import folder_of
-
-INVENTORIES = (".csv", ".tsv", ".txt", ".json", ".geojson", ".gpkg", ".las", ".laz")
-"""Extensions of files with a row per plant."""
 
 
 def scene_at(path: Path, library: Path) -> Scene:
