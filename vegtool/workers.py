@@ -10,7 +10,7 @@ from concurrent.futures import Future, as_completed
 from contextlib import contextmanager
 from multiprocessing import get_context
 from types import TracebackType
-from typing import TYPE_CHECKING, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Self, TypeVar
 
 from vegtool.progress import Progress, silent
 
@@ -25,39 +25,24 @@ WORKER_DIED = (
     "the process that converted it, or one beside it, was ended from outside, mostly for want of"
     " memory; fewer files at a time (-j) need less"
 )
-TRIES = 3
-"""Times that an item is begun whose process ends under it, before it counts as what ends it."""
+TRIES = 2
+"""Times that an item is begun alone whose process ends under it, before it counts as what ends
+it."""
+AGAIN = 8
+"""Items to each process that are begun again together, where all that were waiting are lost."""
 
 
-class Crew(Protocol):
-    """Those who do the work."""
-
-    def each(
-        self, function: Callable[[Item], Result], items: Sequence[Item]
-    ) -> Iterator[tuple[Item, Result | None]]:
-        """Each item with its result, in the order in which they are done; None where whoever
-        worked on it was ended from outside, again and again."""
-
-
-class Alone:
-    """A Crew of this process."""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        """Nothing is left to end."""
-
-    def each(
-        self, function: Callable[[Item], Result], items: Sequence[Item]
-    ) -> Iterator[tuple[Item, Result | None]]:
-        for item in items:
-            yield item, function(item)
+def alone(
+    function: Callable[[Item], Result], items: Sequence[Item]
+) -> Iterator[tuple[Item, Result | None]]:
+    """As `Processes.each`, in this process."""
+    for item in items:
+        yield item, function(item)
 
 
 class Processes:
-    """A Crew of processes on this machine, until the `with` block ends; an exception in it, Ctrl-C
-    included, ends them at their next `check_stop`."""
+    """Processes on this machine, until the `with` block ends; an exception in it, Ctrl-C included,
+    ends them at their next `check_stop`."""
 
     def __init__(self, count: int) -> None:
         self._count = count
@@ -95,33 +80,44 @@ class Processes:
     def each(
         self, function: Callable[[Item], Result], items: Sequence[Item]
     ) -> Iterator[tuple[Item, Result | None]]:
+        """Each item with its result, in the order in which they are done; None where whoever
+        worked on it was ended from outside, again and again."""
+        lost: list[Item] = []
+        yield from self._together(function, items, lost)
+        # a process that ends takes all with it that wait for one: again, a few at a time, and the
+        # few of whom one ends its process, one at a time
+        few = AGAIN * self._count
+        for first in range(0, len(lost), few):
+            once_more: list[Item] = []
+            yield from self._together(function, lost[first : first + few], once_more)
+            for item in once_more:
+                yield item, self._again(function, item)
+
+    def _together(
+        self, function: Callable[[Item], Result], items: Sequence[Item], lost: list[Item]
+    ) -> Iterator[tuple[Item, Result]]:
+        """Items with their results; those that were lost with a process are added to `lost`, in
+        their order."""
         from concurrent.futures.process import BrokenProcessPool
 
         futures = self.submit(function, [(item,) for item in items])
         of = dict(zip(futures, items, strict=True))
-        lost = []
         for future in as_completed(futures):
             try:
                 result = future.result()
             except BrokenProcessPool:
-                lost.append(of[future])
-            else:
-                yield of[future], result
-        # whichever of them ends its process is to end no other's: again, one at a time
-        for item in sorted(lost, key=list(items).index):
-            yield item, self._again(function, item)
+                continue
+            yield of.pop(future), result
+        lost += of.values()
+        if of:
+            self._end()  # one that has lost a process takes no more work
 
     def _again(self, function: Callable[[Item], Result], item: Item) -> Result | None:
         """The result of an item that was lost; None where it is lost again and again."""
-        from concurrent.futures.process import BrokenProcessPool
-
-        for _ in range(TRIES - 1):
-            self._end()  # one that has lost a process takes no more work
-            try:
-                (future,) = self.submit(function, [(item,)])
-                return future.result()
-            except BrokenProcessPool:
-                continue
+        for _ in range(TRIES):
+            lost: list[Item] = []
+            for _, result in self._together(function, [item], lost):
+                return result
         return None
 
     def _end(self) -> None:

@@ -33,7 +33,7 @@ from vegtool.convert import ConvertOptions, convert
 from vegtool.formats.gltf import write_chain
 from vegtool.formats.gltf_data import open_gltf
 from vegtool.formats.gltf_tile import INSTANCING, Instances, instanced_glb
-from vegtool.formats.tileset import TILESET, TileEntry, tileset_files
+from vegtool.formats.tileset import CLIENT_PX, TILESET, TileEntry, tileset_files
 from vegtool.growth import sample
 from vegtool.lighting.light import Light
 from vegtool.lod import Display
@@ -42,7 +42,7 @@ from vegtool.measure.options import MeasureOptions
 from vegtool.plant import Material
 from vegtool.preview.eye import Eye, towards
 from vegtool.preview.scenery import Look
-from vegtool.preview.tile_forest import CLIENT_PX, TileForest
+from vegtool.preview.tile_forest import TileForest
 from vegtool.preview.tileset import Tileset, read_tileset
 from vegtool.seeding import generator
 

@@ -20,13 +20,14 @@ from vegtool.errors import InputError
 from vegtool.formats import ReadOptions, tileset
 from vegtool.formats.gltf import plant_glb
 from vegtool.formats.gltf_data import open_gltf
+from vegtool.formats.tileset import CLIENT_PX
 from vegtool.formats.tileset_check import check_tileset
 from vegtool.growth import sample
 from vegtool.preview import tile_store
 from vegtool.preview.eye import Eye
 from vegtool.preview.scenery import IN_FULL, Look
 from vegtool.preview.show import Show
-from vegtool.preview.tile_forest import CLIENT_PX, TileForest
+from vegtool.preview.tile_forest import TileForest
 from vegtool.preview.tile_store import TileStore
 from vegtool.preview.tile_world import read_tile_world
 from vegtool.preview.tileset import read_model, read_tile, read_tileset

@@ -123,7 +123,11 @@ def test_a_property_may_be_chosen_in_place_of_a_coordinate(tmp_path: Path) -> No
             "feature 1, column height: expected a number, found '{\"m\": 2}'; correct or remove",
         ),
         (
-            {"features": [{"geometry": {"type": "Point", "coordinates": [1, 2]}, "properties": [1]}]},
+            {
+                "features": [
+                    {"geometry": {"type": "Point", "coordinates": [1, 2]}, "properties": [1]}
+                ]
+            },
             "feature 1: expected properties with names, found [1]; correct or remove it",
         ),
         (

@@ -21,6 +21,7 @@ from plant_tables import columns
 from test_tiles_run import COUNT, HIGH, PLACED, files, inventory, library
 from tile_cases import TWO_SPECIES, scene_of
 
+from vegtool import workers
 from vegtool.cli import run as main
 from vegtool.errors import OutputError, UsageError, VegtoolError
 from vegtool.formats.gltf_data import open_gltf
@@ -35,7 +36,7 @@ from vegtool.tiles.options import RunOptions, TileOptions
 from vegtool.tiles.quadtree import Node
 from vegtool.tiles.run import Run
 from vegtool.tiles.shared import Shared
-from vegtool.workers import Alone, Processes
+from vegtool.workers import Processes, alone
 
 OPTIONS = TileOptions(tile=16.0, near=1, triangles=400)
 """Some 16 blocks of 32 m, most of whose tiles are there, and merged squares above them."""
@@ -88,13 +89,24 @@ def doubled(number: int) -> int:
     return 2 * number
 
 
-def test_a_process_that_is_ended_ends_no_other_work() -> None:
-    """The others' results are there, once each, whatever they lost on the way."""
-    with Processes(2) as crew:
-        found = dict(crew.each(doubled, [1, 13, 2, 3]))
-    assert found == {1: 2, 2: 4, 3: 6, 13: None}
-    with Alone() as one:
-        assert dict(one.each(doubled, [4])) == {4: 8}
+def test_a_process_that_is_ended_ends_no_other_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The others' results are there, once each, whatever they lost on the way. Of four that wait
+    for a process that the first ends, two at a time begin again together; of its own two each is
+    begun alone, it itself twice."""
+    sizes = list[int]()
+    right = Processes.submit
+
+    def counted(processes: Processes, function: Any, jobs: Sequence[Any]) -> Any:
+        sizes.append(len(jobs))
+        return right(processes, function, jobs)
+
+    monkeypatch.setattr(Processes, "submit", counted)
+    monkeypatch.setattr(workers, "AGAIN", 2)
+    with Processes(1) as processes:
+        found = list(processes.each(doubled, [13, 1, 2, 3]))
+    assert found == [(13, None), (1, 2), (2, 4), (3, 6)]
+    assert sizes == [4, 2, 1, 1, 1, 2]
+    assert dict(alone(doubled, [4])) == {4: 8}
 
 
 CLUSTER = ("-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0")
@@ -203,6 +215,17 @@ def test_a_run_goes_on_where_it_was(whole: Whole, tmp_path: Path) -> None:
     assert set(first) | set(second) | set(third) == set(every)
     assert files(of.out) == wanted
     assert made(of) == [], "all is there"
+
+
+def test_what_a_process_that_was_ended_had_begun_is_removed(whole: Whole, tmp_path: Path) -> None:
+    of = replace(whole[0], out=tmp_path / "out")
+    work = Run(world_of(of))
+    for _ in work.tiles():
+        pass
+    part = of.out / "tiles" / ".5_0_0.glb.0123.part"
+    part.write_bytes(b"half")
+    work.finish()
+    assert files(of.out) == whole[1]
 
 
 def test_only_what_is_missing_is_made(whole: Whole, tmp_path: Path) -> None:
@@ -421,7 +444,9 @@ def test_a_run_goes_on_in_the_folder_of_its_scene(tmp_path: Path) -> None:
     points = of.scene.with_name("index.json")
     points.write_text("{}")
     of = replace(of, scene=points, options=replace(of.options, format="glb"))
-    with pytest.raises(OutputError, match=r"index\.json: is where tiles are to go, and .* is there"):
+    with pytest.raises(
+        OutputError, match=r"index\.json: is where tiles are to go, and .* is there"
+    ):
         run(of, RunOptions(1, force=True))
 
 

@@ -23,6 +23,9 @@ MOST = 2000
 APART = 5
 """Levels of tiles in one of several files: 341 tiles."""
 TILESET = "tileset.json"
+CLIENT_PX = 16.0
+"""Pixels that a tile's error may be seen as before clients go on to its children, unless they are
+told otherwise."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ from time import perf_counter
 import numpy as np
 
 from vegtool.arrays import Picture
+from vegtool.formats.tileset import CLIENT_PX
 from vegtool.gl.context import OnGpu
 from vegtool.gl.draw import MSAA
 from vegtool.gl.instances import INSTANCE, WHOLE
@@ -24,8 +25,6 @@ from vegtool.preview.scenery import AS_IT_IS, VIEWS, FrameStats, Look
 from vegtool.preview.tile_store import TileStore
 from vegtool.preview.tileset import Tileset
 
-CLIENT_PX = 16.0
-"""Pixels that a tile's error may be seen as at detail 1, as clients have it."""
 NEAREST_M = 0.1
 """An eye in a tile's box is no nearer."""
 

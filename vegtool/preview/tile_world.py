@@ -8,11 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from vegtool.arrays import FloatArray
+from vegtool.formats.tileset import CLIENT_PX
 from vegtool.gl.landscape import GroundMesh
 from vegtool.lighting.light import Sun
 from vegtool.preview.eye import Eye, towards
 from vegtool.preview.options import FadeMode
-from vegtool.preview.tile_forest import CLIENT_PX, TileForest
+from vegtool.preview.tile_forest import TileForest
 from vegtool.preview.tileset import Tileset, read_tileset
 from vegtool.preview.world import EYE_M, MARGIN_M, STAND_M
 from vegtool.tiles.terrain import Terrain

@@ -23,11 +23,11 @@ from vegtool.formats import read_plant
 from vegtool.formats.beside import find_beside
 from vegtool.formats.gltf_data import GltfFile, open_gltf
 from vegtool.formats.gltf_tile import INSTANCING
+from vegtool.formats.tileset import TILESET
 from vegtool.plant import Plant
 
 LongArray = npt.NDArray[np.int64]
 
-TILESET = "tileset.json"
 UNTURNED = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]
 """Three columns of the transform of a tile that is only moved."""
 BROKEN = (

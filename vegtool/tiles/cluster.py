@@ -26,7 +26,7 @@ worker has several."""
 
 
 class Cluster:
-    """A Crew (vegtool/workers.py) of the workers at a scheduler's address.
+    """The workers at a scheduler's address, in place of Processes (vegtool/workers.py).
 
     Raises CapabilityError without the extra, UsageError where nobody answers, or nobody works.
     """
@@ -68,6 +68,7 @@ class Cluster:
     def each(
         self, function: Callable[[Item], Result], items: Sequence[Item]
     ) -> Iterator[tuple[Item, Result | None]]:
+        """As `Processes.each`."""
         import distributed
 
         as_completed: Any = distributed.as_completed  # untyped

@@ -91,7 +91,7 @@ def _made(
 def _crew(inputs: Inputs, world: World, run: RunOptions) -> Iterator[Each]:
     """Who makes the tiles."""
     from vegtool.tiles.jobs import do, do_at
-    from vegtool.workers import Alone, Processes
+    from vegtool.workers import Processes, alone
 
     if run.dask is not None:
         from vegtool.tiles.cluster import Cluster
@@ -101,7 +101,7 @@ def _crew(inputs: Inputs, world: World, run: RunOptions) -> Iterator[Each]:
         return
     count = _processes(world, run)
     if count <= 1:
-        yield partial(Alone().each, partial(do, world))
+        yield partial(alone, partial(do, world))
         return
     with Processes(count) as processes:
         yield partial(processes.each, partial(do_at, inputs))

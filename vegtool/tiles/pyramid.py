@@ -16,6 +16,7 @@ import numpy as np
 
 from vegtool.arrays import FloatArray
 from vegtool.errors import UsageError
+from vegtool.formats.tileset import CLIENT_PX
 from vegtool.lod import Display
 from vegtool.progress import Progress, silent
 from vegtool.scene import Scene
@@ -31,8 +32,6 @@ from vegtool.tiles.terrain import terrain_of
 
 FROM = 1.0
 """Sides of a square: from where on it is drawn."""
-CLIENT_PX = 16.0
-"""Screen-space error at which clients go on to the next level, unless told otherwise."""
 NEAREST = 0.5
 """Sides of a tile: distance that its plants' levels are for, where nothing is nearer."""
 HANDFUL = 16

@@ -43,7 +43,7 @@ from vegtool.tiles.journal import (
 from vegtool.tiles.pyramid import Pyramid, used_levels
 from vegtool.tiles.quadtree import Node
 from vegtool.tiles.tree import index_json, tree_of
-from vegtool.workers import Alone
+from vegtool.workers import alone
 
 Each = Callable[[Sequence[Job]], Iterator[tuple[Job, list[Outcome] | None]]]
 """Does jobs, in any order; None where whoever did one was ended from outside."""
@@ -65,7 +65,7 @@ class Run:
 
     def __init__(self, world: World, each: Each | None = None, progress: Progress = silent) -> None:
         self.world, self.progress = world, progress
-        self.each = each or partial(Alone().each, partial(do, world))
+        self.each = each or partial(alone, partial(do, world))
         self.found: dict[str, Entry] = {}
         self.failed: dict[str, Failed] = {}
         self._known = read_journal(world.out)
@@ -124,6 +124,7 @@ class Run:
         Raises UsageError where there are no plants on any tile.
         """
         pyramid, out = self.world.pyramid, self.world.out
+        clean(out)  # of processes that were ended
         root = tree_of(pyramid, self.found)
         if root is None:
             if self.failed:
