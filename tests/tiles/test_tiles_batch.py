@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -171,6 +172,22 @@ def test_a_scheduler_that_is_none_is_a_sentence(whole: Whole, tmp_path: Path) ->
     missing = replace(of, scene=tmp_path / "none.toml")  # it is said before anything is read
     with pytest.raises(UsageError, match="--dask: is in place of processes here; leave out -j"):
         run(missing, RunOptions(2, "tcp://127.0.0.1:9"))
+
+
+def test_a_scheduler_that_is_lost_is_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Dask then cancels what it was given."""
+    distributed = pytest.importorskip("distributed")
+    from vegtool.tiles.cluster import Cluster
+
+    def lost() -> None:
+        raise distributed.client.FutureCancelledError("1", "scheduler-connection-lost")
+
+    future = SimpleNamespace(key="1", result=lost)
+    cluster = object.__new__(Cluster)
+    cluster._client = SimpleNamespace(submit=lambda *given, **how: future, loop=None)
+    monkeypatch.setattr(distributed, "as_completed", lambda futures, loop: futures)
+    with pytest.raises(VegtoolError, match="--dask: expected the scheduler .* lost it; start it"):
+        list(cluster.each(doubled, [1]))
 
 
 def test_who_sees_other_files_says_so(tmp_path: Path) -> None:

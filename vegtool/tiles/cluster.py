@@ -8,10 +8,10 @@ worker that has ended to another.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import CancelledError, ThreadPoolExecutor
 from typing import Any, Self, TypeVar
 
-from vegtool.errors import CapabilityError, UsageError
+from vegtool.errors import CapabilityError, UsageError, VegtoolError
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -68,7 +68,7 @@ class Cluster:
     def each(
         self, function: Callable[[Item], Result], items: Sequence[Item]
     ) -> Iterator[tuple[Item, Result | None]]:
-        """As `Processes.each`."""
+        """As `Processes.each`. Raises VegtoolError where the scheduler is lost."""
         import distributed
 
         as_completed: Any = distributed.as_completed  # untyped
@@ -83,6 +83,11 @@ class Cluster:
                 result = future.result()
             except distributed.KilledWorker:
                 yield of[future.key], None
+            except CancelledError as error:
+                raise VegtoolError(
+                    "--dask: expected the scheduler to be there all the time, lost it; start it "
+                    "again: the same command goes on where this one ended"
+                ) from error
             else:
                 yield of[future.key], result
             future.release()
