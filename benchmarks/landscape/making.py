@@ -85,15 +85,13 @@ def _watch(pid: int, peak: list[int], ended: Event) -> None:
 
 @dataclass(frozen=True)
 class Merged:
-    """Merging and writing alone. placed_s, sheet_s: what was given: before it began."""
+    """Merging and writing alone: plants were placed, and the sheet was made, before it began."""
 
     tiles: int
     plants: int
     triangles: int
     bytes: int
     seconds: float
-    placed_s: float
-    sheet_s: float
     peak_mb: int
 
 
@@ -104,9 +102,7 @@ def merging(cache: Path, plants: int) -> Merged:
     world = world_of(Inputs(scene(cache, plants), library(cache, print), out, TileOptions()))
     pyramid, height = world.pyramid, world.pyramid.options.near
     nodes = pyramid.tree.nodes(pyramid.tree.depth - height)
-    started = perf_counter()
     stands = [pyramid.stand(node) for node in nodes]
-    placed = perf_counter()
     world.shared.sheet(height)
     begun = perf_counter()
     triangles = size = 0
@@ -119,9 +115,8 @@ def merging(cache: Path, plants: int) -> Merged:
     seconds = perf_counter() - begun
     shutil.rmtree(out)
     return Merged(
-        len(nodes), sum(map(len, stands)), triangles, size, seconds, placed - started,
-        begun - placed, psutil.Process().memory_info().rss // 10**6 if sys.platform == "win32"
-        else _peak_mb(),
+        len(nodes), sum(map(len, stands)), triangles, size, seconds,
+        psutil.Process().memory_info().rss // 10**6 if sys.platform == "win32" else _peak_mb(),
     )  # fmt: skip
 
 
@@ -136,8 +131,8 @@ def _peak_mb() -> int:
 
 @dataclass(frozen=True)
 class Single:
-    """One of the smallest tiles of a landscape. seconds: of opening it with a library that is read,
-    and of the tile itself; of the whole command. peak_mb: of the command."""
+    """One of the smallest tiles of a landscape of so many plants and tiles. opened_s: of opening it
+    with a library that is read. tile_s: of the tile itself. command_s: of the whole command."""
 
     plants: int
     tiles: int

@@ -11,6 +11,7 @@ import traceback
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from hashlib import file_digest
 from pathlib import Path
 from typing import Any
 
@@ -184,7 +185,13 @@ def _digest(scene: Scene, pyramid: Pyramid) -> str:
         for kind, one in enumerate(pyramid.species)
         for level in range(len(one.levels))
     ]
-    return key_of(*(file.read_bytes() for file in files), *levels)
+    return key_of(*map(_contents, files), *levels)
+
+
+def _contents(path: Path) -> str:
+    """A hash of a file, which may be larger than memory."""
+    with path.open("rb") as file:
+        return file_digest(file, "blake2b").hexdigest()
 
 
 def do(world: World, job: Job) -> list[Outcome]:
