@@ -186,7 +186,7 @@ def test_a_scheduler_that_is_lost_is_a_sentence(monkeypatch: pytest.MonkeyPatch)
     cluster = object.__new__(Cluster)
     cluster._client = SimpleNamespace(submit=lambda *given, **how: future, loop=None)
     monkeypatch.setattr(distributed, "as_completed", lambda futures, loop: futures)
-    with pytest.raises(VegtoolError, match="--dask: expected the scheduler .* lost it; start it"):
+    with pytest.raises(VegtoolError, match=r"--dask: expected the scheduler .* lost it; start it"):
         list(cluster.each(doubled, [1]))
 
 
