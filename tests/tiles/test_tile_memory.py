@@ -76,6 +76,7 @@ def test_whether_too_little_is_left_of_plants_is_said_of_a_square_itself(
     found = chosen(made, shared, root, stand)
     assert found.too_coarse == (times > COARSEST)
     assert found.too_coarse == (2 not in shared._sheets)
+    assert shared.crowded(2) == min(times, COARSEST), "the root is its own middle"
 
 
 # ---------------------------------------------------------------------------------------- textures

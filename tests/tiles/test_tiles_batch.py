@@ -37,6 +37,7 @@ from vegtool.tiles.options import RunOptions, TileOptions
 from vegtool.tiles.quadtree import Node
 from vegtool.tiles.run import Run
 from vegtool.tiles.shared import Shared
+from vegtool.tiles.tree import tree_of
 from vegtool.workers import Processes, alone
 
 OPTIONS = TileOptions(tile=16.0, near=1, triangles=400)
@@ -234,6 +235,37 @@ def test_a_run_goes_on_where_it_was(whole: Whole, tmp_path: Path) -> None:
     assert made(of) == [], "all is there"
 
 
+def test_squares_err_by_more_than_their_quarters(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is clustered anew is off by what its quarters are off already, too. Where all are
+    measured to be off by the same, clients are told of more."""
+    of, below = inputs(tmp_path, options=replace(OPTIONS, triangles=40)), dict[Node, float]()
+    right = jobs_module.reclustered_tile
+
+    def told(pyramid: Any, node: Node, quarters: Any, plants: int, below_m: float) -> Any:
+        below[node] = below_m
+        return right(pyramid, node, quarters, plants, below_m)
+
+    monkeypatch.setattr(jobs_module, "reclustered_tile", told)
+    work = Run(world_of(of))
+    for _ in work.tiles():
+        pass
+    pyramid, found = work.world.pyramid, work.found
+    assert max(below.values()) > 0
+    for node, below_m in below.items():
+        errors = [found[str(one)].facts["error_m"] or 0.0 for one in pyramid.tree.quarters(node)]
+        assert below_m == max(errors)
+    alike = {n: replace(e, facts={**e.facts, "error_m": 1000.0}) for n, e in found.items()}
+    root = tree_of(pyramid, alike)
+    assert root is not None
+    tiles = [root]
+    for tile in tiles:  # which grows
+        assert all(tile.error_m > child.error_m >= 1000.0 for child in tile.children)
+        tiles += tile.children
+    assert len(tiles) == sum(bool(entry.facts) for entry in found.values())
+
+
 def test_what_a_process_that_was_ended_had_begun_is_removed(whole: Whole, tmp_path: Path) -> None:
     of = replace(whole[0], out=tmp_path / "out")
     work = Run(world_of(of))
@@ -279,6 +311,28 @@ def test_only_what_a_plant_changes_is_made(tmp_path: Path) -> None:
     fresh = replace(of, out=tmp_path / "fresh")
     made(fresh)
     assert files(of.out) == files(fresh.out)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"plain": True}, {"near_texture": 4}, {"max_texture": 32}, {"triangles": 200},
+        {"triangles": 40}, {"near_triangles": 12},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_what_an_option_changes_is_made_anew(
+    whole: Whole, tmp_path: Path, changed: dict[str, Any]
+) -> None:
+    """As a run from nothing makes it, whatever was there before."""
+    of = replace(whole[0], out=tmp_path / "out", options=replace(OPTIONS, **changed))
+    shutil.copytree(whole[0].out, of.out)
+    made(of)
+    fresh = replace(of, out=tmp_path / "fresh")
+    made(fresh)
+    wanted = files(fresh.out)
+    assert files(of.out) == wanted
+    assert any(data != whole[1].get(name) for name, data in wanted.items() if name != JOURNAL)
 
 
 def test_what_is_no_longer_there_is_removed(tmp_path: Path) -> None:
@@ -603,6 +657,14 @@ def test_a_journal_keeps_the_last_of_each(tmp_path: Path) -> None:
 @pytest.mark.parametrize("line", [b"", b"{", b"[]", b"7", b'{"name":1}', b"\xff\xfe", b'{"x":1}'])
 def test_a_line_that_is_none_counts_for_nothing(tmp_path: Path, line: bytes) -> None:
     (tmp_path / JOURNAL).write_bytes(line + b"\n")
+    with appended(tmp_path) as write:
+        write(Entry("a", "1"))
+    assert list(read_journal(tmp_path)) == ["a"]
+
+
+def test_a_line_after_one_that_is_not_whole_counts(tmp_path: Path) -> None:
+    """A run that was killed has left no end of line."""
+    (tmp_path / JOURNAL).write_bytes(b'{"name":"b","ke')
     with appended(tmp_path) as write:
         write(Entry("a", "1"))
     assert list(read_journal(tmp_path)) == ["a"]
