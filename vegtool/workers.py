@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, as_completed
@@ -28,6 +29,8 @@ WORKER_DIED = (
 TRIES = 2
 """Times that an item is begun alone whose process ends under it, before it counts as what ends
 it."""
+MOST_ON_WINDOWS = 61
+"""Processes that one can wait for there (concurrent.futures)."""
 AGAIN = 8
 """Items to each process that are begun again together, where all that were waiting are lost."""
 
@@ -45,7 +48,7 @@ class Processes:
     ends them at their next `check_stop`."""
 
     def __init__(self, count: int) -> None:
-        self._count = count
+        self._count = min(count, MOST_ON_WINDOWS) if sys.platform == "win32" else count
         # spawn: a GL context does not survive a fork
         self._spawn = get_context("spawn")
         self._stop = self._spawn.Event()
