@@ -126,7 +126,8 @@ def merged_tile(
         if table is not None:
             plants = GroupPlants(table, vertex_plants(part, sheet.sheet.parts))
     with timed(seconds, "writing"):
-        data = merged_glb(group, sheet.files, str(node), pyramid.options.plain, plants)
+        files = sheet.files_for(part)
+        data = merged_glb(group, files, str(node), pyramid.options.plain, plants)
     error = error_of(pyramid, stand, level)
     triangles = len(group.indices) // 3
     return Tile(node, data, "merged", len(stand), triangles, 1, error, seconds=seconds)

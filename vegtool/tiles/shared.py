@@ -8,7 +8,7 @@ makes a tile makes none of them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -36,6 +36,12 @@ class MergedSheet:
     sheet: Sheet
     files: SheetFiles
     part: IntArray
+
+    def files_for(self, part: IntArray) -> SheetFiles:
+        """Those that a group of these parts, (n,), draws with: none where no part has a picture."""
+        if self.sheet.textured[part].any():
+            return self.files
+        return replace(self.files, color=None, normal=None)
 
     @property
     def triangles(self) -> FloatArray:

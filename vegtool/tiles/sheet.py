@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from vegtool.arrays import ByteArray, FloatArray, IntArray
 from vegtool.baking.pack import pack
@@ -47,7 +48,7 @@ class Sheet:
     size: (2,) texels across and down. pictured: materials whose pictures it shows. rect: (p + 1, 4)
     int32 where, x, y, width and height; the last is white. with_normals: whether any level has
     normal textures. parts: each level as triangles whose texture coordinates are the sheet's.
-    double_sided, unlit: of the one material.
+    textured: (n,) bool, parts that show any picture. double_sided, unlit: of the one material.
     """
 
     size: IntArray
@@ -55,6 +56,7 @@ class Sheet:
     rect: IntArray
     with_normals: bool
     parts: tuple[Triangles, ...]
+    textured: npt.NDArray[np.bool_]
     double_sided: bool
     unlit: bool = False
 
@@ -121,9 +123,11 @@ def sheet_of(levels: Sequence[Plant], max_side: int) -> Sheet:
     parts = tuple(
         _part(plant, place, packing.rect[-1], size, double_sided, normals) for plant in levels
     )
+    textured = np.array([any(m.color_texture for m in _used(plant)) for plant in levels])
     return Sheet(
-        size, tuple(pictured.values()), packing.rect, normals, parts, double_sided, unlit == {True}
-    )
+        size, tuple(pictured.values()), packing.rect, normals, parts, textured, double_sided,
+        unlit == {True},
+    )  # fmt: skip
 
 
 def _used(plant: Plant) -> list[Material]:
