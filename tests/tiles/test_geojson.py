@@ -115,6 +115,14 @@ def test_a_property_may_be_chosen_in_place_of_a_coordinate(tmp_path: Path) -> No
             "feature 1, column height: expected 0 to 150 m, found 9000; say the column's unit",
         ),
         (
+            collection(([1, 2], {"species": ["ash"]})),
+            "feature 1, column species: expected one of ash, pine, found '[\"ash\"]'; correct it",
+        ),
+        (
+            collection(([1, 2], {"species": "ash", "height": True})),
+            "feature 1, column height: expected a number, found 'true'; correct or remove",
+        ),
+        (
             collection(([1], {"species": "ash"})),
             "feature 1: expected two or three numbers as coordinates, found [1]; correct or remo",
         ),

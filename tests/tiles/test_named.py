@@ -128,7 +128,7 @@ def test_two_plants_of_a_name_are_said_when_it_is_asked_for(
         ('[oak]\naliases = "Eiche"', 2, "aliases: expected names in quotes, .*; got 'Eiche'"),
         ('[oak]\naliases = ["Eiche", 7]', 2, "aliases: expected names in quotes"),
         ("[oak]\nheight_m = [9, 3]", 2, "height_m: expected two numbers"),
-        ("[oak]\nheight_m = [0, 3]", 2, "height_m: expected more than 0; got 0"),
+        ("[oak]\nheight_m = [0, 3]", 2, "height_m: expected at least 0.001; got 0"),
         ('[oak]\nup = "north"', 2, "up: expected one of auto, x, y"),
         ('[oak]\nunit = "furlong"', 1, "unit: expected mm, cm"),
         (

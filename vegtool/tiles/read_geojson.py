@@ -52,7 +52,7 @@ def read(path: Path) -> Table:
                 columns.append([point[index] for point in points])
             else:
                 name = named[index - len(given)]
-                columns.append([each.get(name) for each in properties])
+                columns.append([_value(each.get(name)) for each in properties])
         yield tuple(columns)
 
     notes: tuple[str, ...] = ()
@@ -72,6 +72,11 @@ def _crs(document: dict[str, Any]) -> str | None:
         return STANDARD
     match = CODE.search(said)
     return f"EPSG:{match[1]}" if match else None
+
+
+def _value(value: Any) -> Value:
+    """What a property may be here: of lists, objects, true and false, the text."""
+    return json.dumps(value) if isinstance(value, bool | list | dict) else value
 
 
 def _coordinates(path: Path, row: int, feature: Any) -> list[float]:
