@@ -169,6 +169,19 @@ def test_an_alias_that_another_plant_has_as_its_name_is_refused(tmp_path: Path) 
         library.species()
 
 
+@pytest.mark.parametrize("place", [f"oak{MANIFEST}", "oak/any.glb"])
+def test_an_alias_may_be_what_the_plant_is_called_by_itself(tmp_path: Path, place: str) -> None:
+    """A converted plant has a model of its name beside it, and a plant may have a folder."""
+    if place.endswith(MANIFEST):
+        write(tmp_path, "oak")
+    else:
+        (tmp_path / "oak").mkdir()
+        model(tmp_path / "oak", "any.glb")
+    library = tables(tmp_path, f'["Quercus robur"]\nmodel = "{place}"\naliases = ["oak"]')
+    assert [one.name for one in library.species()] == ["Quercus robur"]
+    assert found(library, "Oak") == Path(place)
+
+
 def test_a_folder_of_plants_has_to_be_one(tmp_path: Path) -> None:
     cases: list[tuple[str, type[VegtoolError], str]] = [
         ("none", InputError, "expected a folder of plants, found nothing there"),

@@ -404,7 +404,7 @@ def test_a_tile_alone_is_as_with_all_others(whole: Whole, tmp_path: Path) -> Non
     assert files(of.out) == wanted
 
 
-@pytest.mark.parametrize("name", ["9/9/9", "x", "0/0", "1/7/0", "-1/0/0"])
+@pytest.mark.parametrize("name", ["9/9/9", "x", "0/0", "1/7/0", "-1/0/0", "0/0/1" + 30 * "0"])
 def test_a_tile_of_no_such_name_is_a_sentence(whole: Whole, tmp_path: Path, name: str) -> None:
     of = replace(whole[0], out=tmp_path / "out")
     with pytest.raises(UsageError, match=f"--only {name}: expected LEVEL/COLUMN/ROW of a tile"):

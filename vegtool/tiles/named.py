@@ -118,9 +118,12 @@ class Library:
         Raises UsageError where an alias is the name of another plant.
         """
         entries = list(dict.fromkeys(self.entries.values()))
-        taken = {entry.model.resolve() for entry in entries if entry.model is not None}
+        named = [entry.model.resolve() for entry in entries if entry.model is not None]
+        taken = {*named, *(one.parent for one in named)}
         names = {same(entry.name): entry.name for entry in entries}
-        there = [*self.manifests, *self.models, *filter(_holds_plants, self.folders)]
+        converted = {same(stem(one)) for one in self.manifests}
+        models = [one for one in self.models if same(stem(one)) not in converted]
+        there = [*self.manifests, *models, *filter(_holds_plants, self.folders)]
         for path in there:
             name = path.name if path in self.folders else stem(path)
             if path.resolve() in taken or same(name) in names:

@@ -185,7 +185,12 @@ def node_of(name: str, pyramid: Pyramid) -> Node:
     plants."""
     match = re.fullmatch(r"(\d+)/(\d+)/(\d+)", name)
     node = Node(*map(int, match.groups())) if match else None
-    if node is None or node.level > pyramid.tree.depth or not len(pyramid.tree.tiles_of(node)):
+    if (
+        node is None
+        or node.level > pyramid.tree.depth
+        or max(node.column, node.row) >= 2**node.level
+        or not len(pyramid.tree.tiles_of(node))
+    ):
         last = pyramid.tree.nodes(pyramid.tree.depth)[0]
         raise UsageError(
             f"--only {name}: expected LEVEL/COLUMN/ROW of a tile with plants, from 0/0/0 to those "
