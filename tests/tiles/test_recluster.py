@@ -148,6 +148,16 @@ def test_few_pictures_become_one_each(small: bool) -> None:
     assert level.geometric_error_m is not None and level.geometric_error_m[0] < 1e-6
 
 
+def test_a_square_on_a_cliff(small: bool) -> None:
+    """320 m high, and 80 m away: no eye there sees all of it."""
+    low = square(60)
+    shift = np.where(low.positions[:, :1] > 0, [[0, 320, 0]], 0)
+    high = replace(low, positions=low.positions + shift)
+    level = made(high, 40)
+    assert 30 <= level.triangles <= 40
+    assert np.abs(client_plant(level).bounds - high.bounds).max() < 10
+
+
 def test_a_quarter_may_have_nothing(small: bool) -> None:
     """Faces without area cover nothing, as do leaves that alpha cuts away."""
     bare = replace(GREEN, base_color=np.array([0.2, 0.4, 0.1, 0.0]), alpha_mode="mask")

@@ -36,6 +36,9 @@ STEPS = 65535
 LARGEST_STEP_M = 1e-3
 """Metres: where steps of 16 bits would be larger, that is in tiles of more than 65 m, positions are
 floats, so that plants stay where they are beside each other."""
+FINE = 8
+"""Steps at least to the side of half of a far square's triangles: where plants are so small and so
+far apart that there would be fewer, positions are floats, so that something is left of them."""
 SHORT_INDICES = 65535
 """Vertices; index 65535 itself is reserved for primitive restart."""
 LINEAR, LINEAR_MIPMAP_LINEAR, CLAMP_TO_EDGE = 9729, 9987, 33071
@@ -116,7 +119,7 @@ def far_glb(
     """
     document = Document()
     textured, bumped = pictures is not None, pictures is not None and pictures.normal is not None
-    attributes, placed = _vertices(document, group, textured, bumped, plain)
+    attributes, placed = _vertices(document, group, textured, bumped, plain, _side(group) / FINE)
     primitive: dict[str, Any] = {"attributes": attributes}
     if not np.array_equal(group.indices, np.arange(len(group.positions))):
         kind = np.uint16 if len(group.positions) <= SHORT_INDICES else np.uint32
@@ -124,6 +127,12 @@ def far_glb(
         primitive["indices"] = indices
     primitive["material"] = _own_material(document, pictures, name, unlit)
     return _shown(document, primitive, name, placed)
+
+
+def _side(group: Triangles) -> float:
+    """Metres: the square root of twice the median area of its triangles."""
+    a, b, c = np.moveaxis(group.positions[group.indices.reshape(-1, 3)], 1, 0)
+    return float(np.sqrt(np.median(np.linalg.norm(np.cross(b - a, c - a), axis=1))))
 
 
 def _shown(
