@@ -155,7 +155,8 @@ def test_a_square_on_a_cliff(small: bool) -> None:
     high = replace(low, positions=low.positions + shift)
     level = made(high, 40)
     assert 30 <= level.triangles <= 40
-    assert np.abs(client_plant(level).bounds - high.bounds).max() < 10
+    lowest, highest = client_plant(level).bounds[:, 1]
+    assert lowest < 10 and highest > 310, "both steps are there"
 
 
 def test_a_quarter_may_have_nothing(small: bool) -> None:
