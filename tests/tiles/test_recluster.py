@@ -297,6 +297,6 @@ def test_a_square_on_a_cliff_is_looked_at_from_farther_away() -> None:
     low = square(20)
     shift = np.where(low.positions[:, :1] > 0, [[0, 160, 0]], 0)
     with PlantBuffers(replace(low, positions=low.positions + shift)) as buffers:
-        found = looks(buffers, AWAY, DISPLAY)
+        found = looks(buffers, AWAY, Display(60.0, 100))
     assert 80 < found.distance_m[0] < 120
     assert all(one.covered > 0 for one in found.references[0])

@@ -21,7 +21,7 @@ from plant_tables import columns
 from test_tiles_run import COUNT, HIGH, PLACED, files, inventory, library
 from tile_cases import TWO_SPECIES, scene_of
 
-from vegtool.errors import OutputError, UsageError
+from vegtool.errors import InputError, OutputError, UsageError, VegtoolError
 from vegtool.formats.gltf_data import open_gltf
 from vegtool.formats.tileset_check import check_tileset
 from vegtool.seeding import generator
@@ -337,6 +337,27 @@ def test_a_square_that_cannot_be_made_leaves_its_quarters(
     assert file_of(lost) not in text
     for one in world_of(of).pyramid.tree.quarters(lost):
         assert file_of(one) in text
+
+
+def test_a_model_that_cannot_be_made_is_no_bug_of_those_who_draw_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    of = inputs(tmp_path)
+    world, lost = world_of(of), ModelJob(kind=0, level=0)
+    right = type(world.shared).model_files
+
+    def broken(shared: Any, kind: int, level: int) -> Any:
+        if (kind, level) == (lost.kind, lost.level):
+            raise InputError("ash.glb: cannot be read")
+        return right(shared, kind, level)
+
+    monkeypatch.setattr(type(world.shared), "model_files", broken)
+    first, *others = run(of).failed
+    assert first.message == "tile model 0/0: ash.glb: cannot be read" and others
+    for one in others:
+        assert "draws the model" in one.message and "ash_0.gltf, which is not there" in one.message
+    with pytest.raises(VegtoolError, match=r"^tile model 0/0: ash\.glb: cannot be read$"):
+        run(of, RunOptions(1, dry_run=True))
 
 
 def test_a_full_disk_ends_the_run_which_goes_on_later(

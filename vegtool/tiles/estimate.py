@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from vegtool.console import human_bytes, table
+from vegtool.errors import VegtoolError
 from vegtool.progress import Progress
 from vegtool.tiles.jobs import TILES, Failed, Made, SheetJob, World, do
 from vegtool.tiles.run import blocks, models
@@ -103,9 +104,9 @@ def _text(facts: dict[str, Any], processes: int) -> str:
 
 
 def _made(world: World, job: Any) -> list[Made]:
-    """What a job made. Raises RuntimeError where it failed."""
+    """What a job made. Raises VegtoolError where it failed."""
     outcomes = do(world, job)
     for one in outcomes:
         if isinstance(one, Failed):
-            raise RuntimeError(one.message)
+            raise VegtoolError(one.message)
     return [one for one in outcomes if isinstance(one, Made)]

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from vegtool.arrays import FloatArray, IntArray
+from vegtool.errors import InputError
 from vegtool.formats import png
 from vegtool.formats.gltf_tile import SheetFiles
 from vegtool.formats.shared_model import SharedModel, model_files, plain_name, read_shared
@@ -70,7 +71,13 @@ class Shared:
         """A level whose files are written, as instances refer to it."""
         if (kind, level) not in self._models:
             file = self.folder / FOLDER / f"{plain_name(self.model_name(kind, level))}.gltf"
-            self._models[kind, level] = read_shared(file, f"{FOLDER}/")
+            try:
+                self._models[kind, level] = read_shared(file, f"{FOLDER}/")
+            except OSError as error:
+                raise InputError(
+                    f"draws the model {file}, which is not there ({error.strerror}); the same "
+                    "command makes it"
+                ) from error
         return self._models[kind, level]
 
     def crowded(self, height: int) -> float:
