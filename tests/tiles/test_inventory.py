@@ -153,7 +153,9 @@ def test_z_is_the_height_where_there_is_no_ground(tmp_path: Path) -> None:
     assert {row: up for row, (_, _, up) in on_the_map(placement).items()} == {1: 512.25, 2: 0}
     (note,) = placement.notes
     assert note.endswith("plants without z, which stand at height 0: 1")
-    with pytest.raises(InputError, match=r"row 2 \(line 3\), column z_ft: expected -1000 to 10000 m"):
+    with pytest.raises(
+        InputError, match=r"row 2 \(line 3\), column z_ft: expected -1000 to 10000 m"
+    ):
         inventory(tmp_path, ["1,2,3000,ash", "3,4,-9999,ash"], "x,y,z_ft,species")
 
 

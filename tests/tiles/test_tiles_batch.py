@@ -28,7 +28,15 @@ from vegtool.seeding import generator
 from vegtool.tiles import jobs as jobs_module
 from vegtool.tiles.command import Result, run_tiles
 from vegtool.tiles.jobs import Inputs, Made, ModelJob, do_at, file_of, world_of
-from vegtool.tiles.journal import JOURNAL, Entry, alone, appended, key_of, read_journal, write_journal
+from vegtool.tiles.journal import (
+    JOURNAL,
+    Entry,
+    alone,
+    appended,
+    key_of,
+    read_journal,
+    write_journal,
+)
 from vegtool.tiles.options import RunOptions, TileOptions
 from vegtool.tiles.quadtree import Node
 from vegtool.tiles.run import Run

@@ -23,7 +23,9 @@ TABLES = "species.toml"
 KEYS = {
     "model": Key("text", "file or folder of the plant; by default what has the species' name"),
     "aliases": Key("names", "other names that inventories and scenes call it"),
-    "height_m": Key("range", "of plants whose height the inventory does not say", least=0.001, most=1000),
+    "height_m": Key(
+        "range", "of plants whose height the inventory does not say", least=0.001, most=1000
+    ),
     "unit": Key("text", "of the model, as --unit of convert"),
     "up": Key("text", "its upward axis, as --up", choices=UP_AXES),
     "leaf_material": Key("names", "its materials that are leaves, as --leaf-material"),
