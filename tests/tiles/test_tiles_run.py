@@ -556,6 +556,8 @@ def test_plants_of_one_name_keep_their_files() -> None:
     names = file_names(["oak", "Oak", "o k", "o_k", "pine"])
     assert len({plain_name(name).lower() for name in names}) == 5
     assert names[-1] == "pine", "those that differ anyway keep their names"
+    names = file_names(["oak", "Oak", "oak_0"])
+    assert len({plain_name(name).lower() for name in names}) == 3
 
 
 def test_sides_count(tmp_path: Path) -> None:

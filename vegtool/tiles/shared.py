@@ -137,7 +137,10 @@ class Shared:
 def file_names(names: Sequence[str]) -> list[str]:
     """Names that no two have, whatever the file system thinks of capitals."""
     plain = [plain_name(name).lower() for name in names]
-    return [
-        name if plain.count(own) == 1 else f"{name}_{index}"
-        for index, (name, own) in enumerate(zip(names, plain, strict=True))
+    numbered = [f"{name}_{index}" for index, name in enumerate(names)]
+    found = [
+        name if plain.count(own) == 1 else other
+        for name, own, other in zip(names, plain, numbered, strict=True)
     ]
+    # where another plant has such a number in its own name, all are numbered
+    return found if len({plain_name(name).lower() for name in found}) == len(found) else numbered
