@@ -50,6 +50,15 @@ def test_half_of_the_billboards_at_twice_the_distance(chain: LodChain) -> None:
     assert near[2] == pytest.approx(2 * near[1], rel=0.05)
 
 
+def test_distances_double_beyond_the_size_that_pictures_are_made_for(bush: Plant) -> None:
+    """A tree of few triangles is not seen from where one of twice as many is: else the coarsest
+    alone would be left of those that are made for the smallest size."""
+    made = convert(bush, replace(OPTIONS, billboards=16, pixels=16.0, levels=4), BY_RULE)
+    near = [level.near_distance_m for level in made.levels[1:]]
+    assert len(near) == 4, "16, 8, 4 and 2 pixels; made for 16, 8, 8 and 8"
+    assert np.diff(np.log2(near)) == pytest.approx(1, rel=0.02), "rounded up"
+
+
 def test_wood_is_a_mesh_where_levels_are_refined(chain: LodChain, options: ConvertOptions) -> None:
     """Leaves may be triangles too, then the level is a mesh and no more."""
     for level in chain.levels[1:]:

@@ -9,10 +9,11 @@ faces. From where it may be used is measured then (measure/chain.py).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, fields, replace
 from functools import partial
+from itertools import pairwise
 from math import log
 from typing import TYPE_CHECKING, cast, get_args
 
@@ -25,6 +26,7 @@ from vegtool.lighting.crown import crown_normals
 from vegtool.lighting.leaves import translucent
 from vegtool.lighting.light import Light, Sun
 from vegtool.lod import Display, Level, LodChain
+from vegtool.measure.distances import rounded_up
 from vegtool.measure.options import MeasureOptions
 from vegtool.measure.views import distance_of
 from vegtool.options import check_limits, flag_of, option
@@ -216,7 +218,6 @@ def convert(
     from vegtool.baking.bake import PlantBuffers
     from vegtool.gl.sun import SunMaps
     from vegtool.measure.chain import views_of, with_distances
-    from vegtool.measure.distances import rounded_up
     from vegtool.measure.scores import Shadowed, TruthsAt
 
     options, measure = options or ConvertOptions(), measure or MeasureOptions()
@@ -240,19 +241,18 @@ def convert(
             baked_from = stack.enter_context(PlantBuffers(crowned))
         make = level_maker(baked_from, truth_at, options)
         size = options.pixels or near_pixels(counts[0])
-        near, farthest = (
+        first_near_m, farthest = (
             rounded_up(distance_of(plant, options.display, pixels))
             for pixels in (size, NEAR_LIMITS[0])
         )
-        first_near_m = near
-        for index, count in enumerate(counts):
+        near_m = near_distances(counts, first_near_m, farthest)
+        for index, (count, near) in enumerate(zip(counts, near_m, strict=True)):
 
             def report(stage: str, fraction: float, index: int = index) -> None:
                 done = making * (index + fraction) / len(counts)
                 progress(f"LOD{index + 1}: {stage}", done)
 
-            level = make(count, near, report)
-            near = min(rounded_up(LEVEL_RATIO * near), farthest)
+            level = replace(make(count, min(near, farthest), report), near_distance_m=near)
             saves = level.triangles <= MOST_OF_PREVIOUS * levels[-1].triangles
             if saves or (index == len(counts) - 1 and len(levels) == 1):
                 levels.append(level)
@@ -409,6 +409,16 @@ def billboard_counts(plant: Plant, options: ConvertOptions) -> list[int]:
     """Planes per level, finest first: half each time, never more than the plant can use."""
     first = min(options.billboards, most_billboards(plant))
     return [max(1, round(first / LEVEL_RATIO**i)) for i in range(options.levels)]
+
+
+def near_distances(counts: Sequence[int], first_m: float, farthest_m: float) -> list[float]:
+    """Metres from which levels of so many planes are to be used: twice as far each time; beyond the
+    farthest that pictures are made for, only with fewer planes."""
+    near = [first_m]
+    for before, count in pairwise(counts):
+        twice = rounded_up(LEVEL_RATIO * near[-1])
+        near.append(twice if count < before else max(near[-1], min(twice, farthest_m)))
+    return near
 
 
 def most_billboards(plant: Plant) -> int:

@@ -120,7 +120,7 @@ def seen(
 
 def _truth(eye: Eye, station: Station, scene: Path, library: Path, cache: Path) -> Picture:
     where = (*eye.position.tolist(), eye.yaw_deg, eye.pitch_deg, eye.fov_y_deg, SIZE, SUPERSAMPLE)
-    originals = sorted(file.name for file in library.glob("*.glb"))
+    originals = sorted(file.name for file in library.glob("*.lod.json"))
     key = key_of(scene.read_text("utf-8"), originals, where)
     file = cache / "truth" / f"{station.name}_{key}.npz"
     if not file.exists():

@@ -192,13 +192,33 @@ def test_the_material_is_the_sheets(tmp_path: Path) -> None:
     assert (material.color_texture.pixels == (90, 120, 40, 255)).all()
     assert (material.normal_texture.pixels == (128, 128, 255, 255)).all()
     values = chunk(merged_glb(group(), BUMPED, "t"))
-    assert [image["uri"] for image in values["images"]] == [BUMPED.normal, BUMPED.color]
+    assert [image["uri"] for image in values["images"]] == [BUMPED.color, BUMPED.normal]
     assert {(s["wrapS"], s["wrapT"]) for s in values["samplers"]} == {(33071, 33071)}
     (one,) = values["materials"]
     assert (one["alphaMode"], one["alphaCutoff"], one["doubleSided"]) == ("MASK", 0.5, True)
     single = chunk(merged_glb(group(), replace(SHEET, double_sided=False), "t"))
     assert single["materials"][0]["doubleSided"] is False
     assert "normalTexture" not in single["materials"][0]
+
+
+def test_a_group_without_pictures_has_colors_alone(tmp_path: Path) -> None:
+    """Opaque triangles: nothing in the file that is for textures, and what is drawn is the same."""
+    bare = replace(SHEET, color=None)
+    data = merged_glb(group(), bare, "t")
+    values = chunk(data)
+    assert not {"images", "textures", "samplers"} & set(values)
+    (primitive,) = values["meshes"][0]["primitives"]
+    assert set(primitive["attributes"]) == {"POSITION", "NORMAL", "COLOR_0"}
+    assert "indices" not in primitive, "no two triangles share a vertex"
+    found, textured = (
+        read(tmp_path, merged_glb(group(), sheet, "t"), name)
+        for sheet, name in ((bare, "bare.glb"), (SHEET, "textured.glb"))
+    )
+    (material,) = found.materials
+    assert material.alpha_mode == "opaque" and material.double_sided
+    np.testing.assert_array_equal(found.corners, textured.corners)
+    assert found.colors is not None and textured.colors is not None
+    np.testing.assert_array_equal(found.colors[found.faces], textured.colors[textured.faces])
 
 
 def test_a_moved_group_has_the_same_vertices_at_another_place() -> None:

@@ -49,10 +49,11 @@ MASKED = {"alphaMode": "MASK", "alphaCutoff": 0.5}
 
 @dataclass(frozen=True)
 class SheetFiles:
-    """Where a group's textures are, relative to the tile: color and normal (or None); and of its
-    material whether it is drawn from both sides, and whether light is in its colours."""
+    """Where a group's textures are, relative to the tile: color, and normal or None; None for both
+    where all is opaque in the colours of its vertices. And of its material whether it is drawn from
+    both sides, and whether light is in its colours."""
 
-    color: str
+    color: str | None
     normal: str | None
     double_sided: bool
     unlit: bool = False
@@ -76,10 +77,9 @@ def merged_glb(
     plain: float32 in place of KHR_mesh_quantization. plants: for clients that ask which is which.
     """
     document = Document()
-    attributes, placed = _vertices(
-        document, group, True, sheet.normal is not None, plain, LARGEST_STEP_M
-    )
-    kind = np.uint16 if len(group.positions) <= SHORT_INDICES else np.uint32
+    images = [None if uri is None else {"uri": uri} for uri in (sheet.color, sheet.normal)]
+    textured, bumped = sheet.color is not None, sheet.normal is not None
+    attributes, placed = _vertices(document, group, textured, bumped, plain, LARGEST_STEP_M)
     more: dict[str, Any] = {}
     if plants is not None:
         add_tables(document, [plants.table])
@@ -87,8 +87,8 @@ def merged_glb(
         more["extensions"] = of_vertices(document, 0, len(plants.table))
     primitive = {
         "attributes": attributes,
-        "indices": document.add_accessor(group.indices.astype(kind), ELEMENT_ARRAY_BUFFER),
-        "material": _material(document, sheet, name),
+        **_indices(document, group),
+        "material": _material(document, name, images, sheet.double_sided, sheet.unlit),
         **more,
     }
     return _shown(document, primitive, name, placed)
@@ -114,19 +114,29 @@ def far_glb(
     material.
 
     pictures: written into the file; None for opaque triangles, which then have the colours of their
-    vertices and no texture coordinates. Vertices that no two triangles share need no indices, and
-    have none. plain: float32 in place of KHR_mesh_quantization.
+    vertices and no texture coordinates. plain: float32 in place of KHR_mesh_quantization.
     """
     document = Document()
-    textured, bumped = pictures is not None, pictures is not None and pictures.normal is not None
-    attributes, placed = _vertices(document, group, textured, bumped, plain, _side(group) / FINE)
-    primitive: dict[str, Any] = {"attributes": attributes}
-    if not np.array_equal(group.indices, np.arange(len(group.positions))):
-        kind = np.uint16 if len(group.positions) <= SHORT_INDICES else np.uint32
-        indices = document.add_accessor(group.indices.astype(kind), ELEMENT_ARRAY_BUFFER)
-        primitive["indices"] = indices
-    primitive["material"] = _own_material(document, pictures, name, unlit)
+    color, normal = (None, None) if pictures is None else (pictures.color, pictures.normal)
+    attributes, placed = _vertices(
+        document, group, color is not None, normal is not None, plain, _side(group) / FINE
+    )
+    images = [_image(document, color, name, "color"), _image(document, normal, name, "normal")]
+    primitive = {
+        "attributes": attributes,
+        **_indices(document, group),
+        "material": _material(document, name, images, True, unlit),
+    }
     return _shown(document, primitive, name, placed)
+
+
+def _indices(document: Document, group: Triangles) -> dict[str, int]:
+    """None where no two triangles share a vertex: clients then take them as they come."""
+    count = len(group.positions)
+    if np.array_equal(group.indices, np.arange(count)):
+        return {}
+    kind = np.uint16 if count <= SHORT_INDICES else np.uint32
+    return {"indices": document.add_accessor(group.indices.astype(kind), ELEMENT_ARRAY_BUFFER)}
 
 
 def _side(group: Triangles) -> float:
@@ -253,56 +263,46 @@ def _colors(document: Document, group: Triangles) -> dict[str, int]:
     return {"COLOR_0": document.add_accessor(colors, normalized=True)}
 
 
-def _material(document: Document, sheet: SheetFiles, name: str) -> int:
-    sampler = _sampler(document)
-
-    def texture(uri: str) -> dict[str, int]:
-        image = document.add("images", uri=uri)
-        return {"index": document.add("textures", source=image, sampler=sampler)}
-
-    more: dict[str, Any] = {}
-    if sheet.normal is not None:
-        more["normalTexture"] = texture(sheet.normal)
-    if sheet.unlit:
-        more |= _unlit(document)
-    return document.add(
-        "materials",
-        name=name,
-        pbrMetallicRoughness={"baseColorTexture": texture(sheet.color), **DULL},
-        **MASKED,
-        doubleSided=sheet.double_sided,
-        **more,
-    )
-
-
-def _own_material(document: Document, pictures: OwnPictures | None, name: str, unlit: bool) -> int:
+def _material(
+    document: Document,
+    name: str,
+    images: Sequence[dict[str, Any] | None],
+    double_sided: bool,
+    unlit: bool,
+) -> int:
+    """images: of colours and of normals, or None; without any, what is drawn is opaque. Pictures
+    have neighbours, or edges."""
     surface: dict[str, Any] = dict(DULL)
     more: dict[str, Any] = _unlit(document) if unlit else {}
-    if pictures is not None:
-        sampler = _sampler(document)
-
-        def texture(pixels: ByteArray, kind: str) -> dict[str, int]:
-            view = document.add_view(png.encode(pixels))
-            image = document.add(
-                "images", name=f"{name}_{kind}", mimeType="image/png", bufferView=view
-            )
-            return {"index": document.add("textures", source=image, sampler=sampler)}
-
-        surface["baseColorTexture"] = texture(pictures.color, "color")
-        if pictures.normal is not None:
-            more["normalTexture"] = texture(pictures.normal, "normal")
-        more |= MASKED
+    if any(images):
+        sampler = document.add(
+            "samplers", magFilter=LINEAR, minFilter=LINEAR_MIPMAP_LINEAR, wrapS=CLAMP_TO_EDGE,
+            wrapT=CLAMP_TO_EDGE,
+        )  # fmt: skip
+        color, normal = (
+            {"index": document.add("textures", source=document.add("images", **image),
+                                   sampler=sampler)}
+            if image else None
+            for image in images
+        )  # fmt: skip
+        if color is not None:
+            surface["baseColorTexture"] = color
+            more |= MASKED
+        if normal is not None:
+            more["normalTexture"] = normal
     return document.add(
-        "materials", name=name, pbrMetallicRoughness=surface, doubleSided=True, **more
+        "materials", name=name, pbrMetallicRoughness=surface, doubleSided=double_sided, **more
     )
 
 
-def _sampler(document: Document) -> int:
-    """Of pictures that have neighbours, or edges."""
-    return document.add(
-        "samplers", magFilter=LINEAR, minFilter=LINEAR_MIPMAP_LINEAR, wrapS=CLAMP_TO_EDGE,
-        wrapT=CLAMP_TO_EDGE,
-    )  # fmt: skip
+def _image(
+    document: Document, pixels: ByteArray | None, name: str, kind: str
+) -> dict[str, Any] | None:
+    """A picture within the file."""
+    if pixels is None:
+        return None
+    view = document.add_view(png.encode(pixels))
+    return {"name": f"{name}_{kind}", "mimeType": "image/png", "bufferView": view}
 
 
 def _unlit(document: Document) -> dict[str, Any]:

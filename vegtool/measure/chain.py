@@ -175,11 +175,13 @@ class _Measuring:
 
 
 def _by_texels(levels: Sequence[Level], display: Display) -> list[float]:
-    """Metres from which a texel of each level covers no more than a pixel: the distance that its
-    atlas was made for. What is smeared is seen sooner than a mean error over the picture tells.
-    A mesh, which has none, is likewise for the distances that it was made for."""
+    """Metres from which levels were made to be used, and a texel of each covers no more than a
+    pixel: what is smeared is seen sooner than a mean error over the picture tells."""
     return [
-        display.distance_m(level.texels_per_metre) if level.atlas else level.near_distance_m
+        max(
+            level.near_distance_m,
+            display.distance_m(level.texels_per_metre) if level.atlas else 0.0,
+        )
         for level in levels
     ]
 

@@ -101,7 +101,9 @@ class Shared:
     def sheet_files(self, height: int) -> dict[str, bytes]:
         """A sheet's files, by their names in FOLDER."""
         sheet, named = self.sheet(height).sheet, self.sheet(height).files
-        files = {Path(named.color).name: png.encode(sheet.color)}
+        files = {}
+        if named.color is not None:
+            files[Path(named.color).name] = png.encode(sheet.color)
         if named.normal is not None and sheet.normal is not None:
             files[Path(named.normal).name] = png.encode(sheet.normal[..., :3])
         return files
@@ -113,8 +115,9 @@ class Shared:
         part = np.full(self.pyramid.of_level.shape, -1, np.int32)
         part[tuple(np.array(pairs).T)] = np.arange(len(pairs))
         stem = f"{FOLDER}/sheet_{height}"
+        color = f"{stem}_color.png" if sheet.pictured else None
         normal = f"{stem}_normal.png" if sheet.with_normals else None
-        named = SheetFiles(f"{stem}_color.png", normal, sheet.double_sided, sheet.unlit)
+        named = SheetFiles(color, normal, sheet.double_sided, sheet.unlit)
         return MergedSheet(sheet, named, part)
 
     def _middle(self, height: int) -> Node:
