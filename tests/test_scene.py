@@ -257,6 +257,8 @@ def test_a_long_list_is_read_in_no_time(tmp_path: Path) -> None:
             "[terrain]\nextent_m = [5, 5]\nkind = 'heightmap'",
             'FILE, line 3: kind is "heightmap": expected heightmap in [terrain], text in quotes',
         ),
+        ("[[species]]\nheight_m = [-2, -1]", "line 2: height_m: expected at least 0.001; got -2"),
+        ("[[species]]\nheight_m = [1, 1e6]", "line 2: height_m: expected at most 1000; got 1e+06"),
         ("[budget]\nframe_ms = 0", "line 2: frame_ms: expected more than 0; got 0"),
         ("[budget]\nbytes = 0", "line 2: bytes: expected at least 1; got 0"),
         ("[budget]\ntriangles = 0", "line 2: triangles: expected at least 1; got 0"),

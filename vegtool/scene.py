@@ -69,7 +69,7 @@ SCHEMA: dict[str, dict[str, Key]] = {
         "name": Key("text", "what it is called"),
         "model": Key("text", "file of the plant"),
         "share": Key("number", "of all plants, beside the others' shares", least=0),
-        "height_m": Key("range", "smallest and tallest plant"),
+        "height_m": Key("range", "smallest and tallest plant", least=0.001, most=1000),
         "slope_deg": Key("range", "slopes that it grows on", least=0, most=90),
         "elevation_m": Key("range", "heights of the ground that it grows at"),
         "density": Key("text", "file of a map that says where it grows"),

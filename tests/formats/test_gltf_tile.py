@@ -287,6 +287,17 @@ def test_a_far_square_is_read_back(tmp_path: Path, own: OwnPictures | None, plai
         np.testing.assert_array_equal(material.normal_texture.pixels[..., :3], own.normal)
 
 
+def test_small_plants_far_apart_are_there(tmp_path: Path) -> None:
+    """50 km, of which a step of 16 bits is 0.8 m, and triangles of 0.1 m."""
+    corners = np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]])
+    shift = np.array([[0, 0, 0], [50_000, 0, 0], [0, 0, 50_000]])
+    places = (shift[:, None] + corners).reshape(9, 3)
+    none = np.zeros((9, 4))
+    one = Triangles(places, np.tile([0.0, 0, 1], (9, 1)), none, none[:, :2], np.arange(9), none + 1)
+    found = read(tmp_path, far_glb(one, None, "t"))
+    np.testing.assert_allclose(found.positions, places, atol=0.005)
+
+
 def test_a_far_square_holds_no_more_than_it_needs() -> None:
     """Opaque triangles of one colour each: 20 bytes a vertex, and nothing else."""
     values = chunk(far_glb(group(), None, "t"))

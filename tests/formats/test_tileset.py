@@ -89,12 +89,40 @@ BROKEN: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
     "empty children": (
         lambda v: v["root"]["children"][0].update(children=[]), "found an empty list",
     ),
+    "no children": (
+        lambda v: v["root"].update(children="a"), "children: expected a list of tiles; found 'a'",
+    ),
+    "no child": (
+        lambda v: v["root"].update(children=[7]), "children: expected tiles; found 7",
+    ),
+    "no content": (
+        lambda v: v["root"].update(content=[]), "root: content: expected a uri; found none",
+    ),
+    "no asset": (lambda v: v.update(asset="1.1"), "asset.version: expected 1.1; found None"),
+    "words in a transform": (
+        lambda v: v["root"].update(transform=["a"] * 15 + [1]), "root: transform: expected 16",
+    ),
     "transform": (lambda v: v["root"].update(transform=[1.0] * 4), "root: transform: expected 16"),
+    "twice": (
+        lambda v: v["root"]["children"][1]["content"].update(uri="tiles/a.glb"),
+        "a.glb is that of root.0 too",
+    ),
     "cycle": (
         lambda v: v["root"]["children"][0]["content"].update(uri="tileset.json"),
         "refers to itself",
     ),
 }  # fmt: skip
+
+
+def test_boxes_of_siblings_may_overlap(tmp_path: Path) -> None:
+    """Crowns do, over a border; nothing in 3D Tiles 1.1 is against it."""
+    path = tileset(tmp_path)
+    values = json.loads(path.read_bytes())
+    for child in values["root"]["children"]:
+        child["boundingVolume"] = values["root"]["boundingVolume"]
+        child.pop("transform")
+    path.write_text(json.dumps(values))
+    assert check_tileset(path) == []
 
 
 @pytest.mark.parametrize("name", BROKEN)
@@ -132,6 +160,10 @@ def test_a_tileset_may_refer_to_others(tmp_path: Path) -> None:
     inner["root"]["content"] = {"uri": "tiles/b.glb"}
     (tmp_path / "inner.json").write_text(json.dumps(inner))
     values["root"]["children"][0]["content"] = {"uri": "inner.json"}
+    path.write_text(json.dumps(values))
+    (told,) = check_tileset(path)
+    assert "root.1: content" in told and told.endswith("inner.json: root too")
+    del values["root"]["children"][1]
     path.write_text(json.dumps(values))
     assert check_tileset(path) == []
     inner["root"]["content"] = {"uri": "tileset.json"}

@@ -44,6 +44,7 @@ def refusal(
         "art,X_coord,Y_coord\nash,1.5,2\npine,3,4.25\n",
         "species,x_m,y (m)\nash,1.5,2\npine,3,4.25\n",
         "species,x_cm,y [mm]\nash,150,2000\npine,300,4250\n",
+        ",,,\nx,y,species,\n1.5,2,ash,\n   \n,,,\n3,4.25,pine,\n,,,\n",
     ],
 )
 def test_the_same_two_plants(tmp_path: Path, data: str) -> None:
@@ -60,14 +61,15 @@ def test_all_columns(tmp_path: Path) -> None:
     data = (
         "x,y,z,species,height_m,rotation,crown_m,id\n"
         "0,0,101.5,ash,12.5,90,4,a\n0,0,,ash,,NA,,b\n0,0,nan,pine,-,,,c\n0,0,7,pine,0,360,,d\n"
+        "0,0,,ash,1e-300,0,,e\n"
     )
     rows = rows_of(tmp_path, data)
     nan = pytest.approx(np.nan, nan_ok=True)
-    assert rows.z.tolist() == [101.5, nan, nan, 7]
-    assert rows.height.tolist() == [12.5, nan, nan, nan]
-    assert rows.yaw.tolist() == [pytest.approx(np.pi / 2), nan, nan, pytest.approx(2 * np.pi)]
+    assert rows.z.tolist() == [101.5, nan, nan, 7, nan]
+    assert rows.height.tolist() == [12.5, nan, nan, nan, nan]
+    assert rows.yaw.tolist() == [pytest.approx(np.pi / 2), nan, nan, pytest.approx(2 * np.pi), 0]
     zero, unused = rows.notes
-    assert zero.endswith("plants of height 0, taken as not known: 1")
+    assert zero.endswith("plants of height 0, taken as not known: 2")
     assert unused.endswith("columns that are not used: crown_m, id")
 
 

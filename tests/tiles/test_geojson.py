@@ -131,6 +131,10 @@ def test_a_property_may_be_chosen_in_place_of_a_coordinate(tmp_path: Path) -> No
             "feature 1: expected properties with names, found [1]; correct or remove it",
         ),
         (
+            collection(([1, 2], {"species": "ash", "height": True})),
+            "feature 1, column height: expected a number, found 'true'; correct or remove",
+        ),
+        (
             collection(([1], {"species": "ash"})),
             "feature 1: expected two or three numbers as coordinates, found [1]; correct or remo",
         ),

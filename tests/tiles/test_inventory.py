@@ -100,7 +100,7 @@ def test_the_first_plants_are_the_first_of_all(tmp_path: Path) -> None:
 
 def test_the_file_decides_and_the_seed_what_it_leaves_open(tmp_path: Path) -> None:
     header = "x,y,species,height,yaw"
-    rows = ["1,1,ash,7.5,90", "2,2,ash,,", "3,3,pine,,450"]
+    rows = ["1,1,ash,7.5,90", "2,2,ash,,", "3,3,pine,,36450"]
     more = "[terrain]\nextent_m = [50, 50]\n"
     (tmp_path / "trees.csv").write_text("\n".join([header, *rows]))
     text = more + TWO_SPECIES.replace('"ash"\n', '"ash"\nheight_m = [10, 20]\n')
@@ -111,7 +111,7 @@ def test_the_file_decides_and_the_seed_what_it_leaves_open(tmp_path: Path) -> No
     a, b, c = (int(np.flatnonzero(plants.row == row)[0]) for row in (1, 2, 3))
     d = int(np.flatnonzero(others.row == 2)[0])
     assert plants.height[a] == 7.5 and 10 <= plants.height[b] <= 20 and np.isnan(plants.height[c])
-    assert plants.yaw[a] == pytest.approx(np.pi / 2) and plants.yaw[c] == pytest.approx(2.5 * np.pi)
+    assert plants.yaw[[a, c]] == pytest.approx(np.pi / 2), "whole turns are none"
     assert plants.species[[a, b, c]].tolist() == [0, 0, 1]
     for name in ("height", "yaw", "tint"):
         assert (getattr(plants, name)[b] != getattr(others, name)[d]).all()
@@ -153,6 +153,10 @@ def test_z_is_the_height_where_there_is_no_ground(tmp_path: Path) -> None:
     assert {row: up for row, (_, _, up) in on_the_map(placement).items()} == {1: 512.25, 2: 0}
     (note,) = placement.notes
     assert note.endswith("plants without z, which stand at height 0: 1")
+    with pytest.raises(
+        InputError, match=r"row 2 \(line 3\), column z_ft: expected -1000 to 10000 m"
+    ):
+        inventory(tmp_path, ["1,2,3000,ash", "3,4,-9999,ash"], "x,y,z_ft,species")
 
 
 def test_plants_stand_on_the_ground_where_there_is_one(tmp_path: Path) -> None:
@@ -230,6 +234,13 @@ def test_degrees_become_metres(tmp_path: Path, terrain: str, zone: Zone) -> None
     assert any(said in note for note in placement.notes) == (
         "EPSG:25832" not in terrain and "33" not in terrain
     )
+
+
+def test_degrees_on_both_sides_of_180_are_neighbours(tmp_path: Path) -> None:
+    """0.0002 degrees on the equator: 22.264 m, and at the edge of a zone 0.1 % more."""
+    rows = ["179.9999,0,ash", "-179.9999,0,pine"]
+    found = on_the_map(inventory(tmp_path, rows, "lon,lat,species"))
+    assert np.subtract(found[2], found[1]) == pytest.approx([22.286, 0, 0], abs=0.001)
 
 
 def test_columns_of_metres_are_degrees_where_the_scene_says_so(tmp_path: Path) -> None:

@@ -128,7 +128,7 @@ def test_two_plants_of_a_name_are_said_when_it_is_asked_for(
         ('[oak]\naliases = "Eiche"', 2, "aliases: expected names in quotes, .*; got 'Eiche'"),
         ('[oak]\naliases = ["Eiche", 7]', 2, "aliases: expected names in quotes"),
         ("[oak]\nheight_m = [9, 3]", 2, "height_m: expected two numbers"),
-        ("[oak]\nheight_m = [0, 3]", 2, "height_m: expected more than 0; got 0"),
+        ("[oak]\nheight_m = [0, 3]", 2, "height_m: expected at least 0.001; got 0"),
         ('[oak]\nup = "north"', 2, "up: expected one of auto, x, y"),
         ('[oak]\nunit = "furlong"', 1, "unit: expected mm, cm"),
         (
@@ -167,6 +167,19 @@ def test_an_alias_that_another_plant_has_as_its_name_is_refused(tmp_path: Path) 
     library = tables(tmp_path, '[oak]\naliases = ["Elm"]')
     with pytest.raises(UsageError, match=r"line 1: aliases: .*elm\.glb is called elm too"):
         library.species()
+
+
+@pytest.mark.parametrize("place", [f"oak{MANIFEST}", "oak/any.glb"])
+def test_an_alias_may_be_what_the_plant_is_called_by_itself(tmp_path: Path, place: str) -> None:
+    """A converted plant has a model of its name beside it, and a plant may have a folder."""
+    if place.endswith(MANIFEST):
+        write(tmp_path, "oak")
+    else:
+        (tmp_path / "oak").mkdir()
+        model(tmp_path / "oak", "any.glb")
+    library = tables(tmp_path, f'["Quercus robur"]\nmodel = "{place}"\naliases = ["oak"]')
+    assert [one.name for one in library.species()] == ["Quercus robur"]
+    assert found(library, "Oak") == Path(place)
 
 
 def test_a_folder_of_plants_has_to_be_one(tmp_path: Path) -> None:

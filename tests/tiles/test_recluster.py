@@ -290,3 +290,13 @@ def test_one_sample_tells_as_much_as_many() -> None:
             wanted = truth(buffers, camera, quick.light(view))
             covered = float(wanted[..., 3].sum())
             assert abs(found.covered / covered - 1) < 0.01
+
+
+def test_a_square_on_a_cliff_is_looked_at_from_farther_away() -> None:
+    """160 m high, and seen from 80 m: no eye there sees all of it."""
+    low = square(20)
+    shift = np.where(low.positions[:, :1] > 0, [[0, 160, 0]], 0)
+    with PlantBuffers(replace(low, positions=low.positions + shift)) as buffers:
+        found = looks(buffers, AWAY, Display(60.0, 100))
+    assert 80 < found.distance_m[0] < 120
+    assert all(one.covered > 0 for one in found.references[0])

@@ -31,7 +31,15 @@ from vegtool.seeding import generator
 from vegtool.tiles import jobs as jobs_module
 from vegtool.tiles.command import Result, run_tiles
 from vegtool.tiles.jobs import Inputs, Made, ModelJob, do_at, file_of, world_of
-from vegtool.tiles.journal import JOURNAL, Entry, appended, key_of, read_journal, write_journal
+from vegtool.tiles.journal import (
+    JOURNAL,
+    Entry,
+    appended,
+    key_of,
+    locked,
+    read_journal,
+    write_journal,
+)
 from vegtool.tiles.make import merged_tile
 from vegtool.tiles.options import RunOptions, TileOptions
 from vegtool.tiles.quadtree import Node
@@ -524,6 +532,21 @@ def test_a_run_goes_on_in_the_folder_of_its_scene(tmp_path: Path) -> None:
 # --------------------------------------------------------------------------------- parts of it all
 
 
+@pytest.mark.skipif(os.name == "nt", reason="no locks on folders on Windows")
+def test_two_runs_do_not_share_a_folder(whole: Whole, tmp_path: Path) -> None:
+    """The second would take away what the first makes; it waits for nobody, and changes nothing."""
+    of = replace(whole[0], out=tmp_path / "out")
+    with (
+        locked(of.out),
+        pytest.raises(OutputError, match="another run of vegtool tiles is at"),
+    ):
+        run(of)
+    assert not of.out.exists()
+    with pytest.raises(UsageError, match="expected its quarters"):
+        run(of, RunOptions(1, only=("0/0/0",)))
+    assert not of.out.exists()
+
+
 def test_a_tile_alone_is_as_with_all_others(whole: Whole, tmp_path: Path) -> None:
     """With the models and the sheet that it draws, and no tileset; what another process is writing
     there stays."""
@@ -667,6 +690,13 @@ def test_a_line_after_one_that_is_not_whole_counts(tmp_path: Path) -> None:
     (tmp_path / JOURNAL).write_bytes(b'{"name":"b","ke')
     with appended(tmp_path) as write:
         write(Entry("a", "1"))
+    assert list(read_journal(tmp_path)) == ["a"]
+
+
+@pytest.mark.parametrize("name", ["../x", "tiles/../../x", "/x"])
+def test_files_elsewhere_are_not_ours(tmp_path: Path, name: str) -> None:
+    """Nobody who puts tiles into a folder that came from others is to lose files for it."""
+    write_journal(tmp_path, {"a": Entry("a", "1", {"x": 3}), "b": Entry("b", "1", {name: 3})})
     assert list(read_journal(tmp_path)) == ["a"]
 
 

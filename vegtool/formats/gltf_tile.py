@@ -36,6 +36,9 @@ STEPS = 65535
 LARGEST_STEP_M = 1e-3
 """Metres: where steps of 16 bits would be larger, that is in tiles of more than 65 m, positions are
 floats, so that plants stay where they are beside each other."""
+FINE = 8
+"""Steps at least to the side of half of a far square's triangles: where plants are so small and so
+far apart that there would be fewer, positions are floats, so that something is left of them."""
 SHORT_INDICES = 65535
 """Vertices; index 65535 itself is reserved for primitive restart."""
 LINEAR, LINEAR_MIPMAP_LINEAR, CLAMP_TO_EDGE = 9729, 9987, 33071
@@ -115,7 +118,9 @@ def far_glb(
     """
     document = Document()
     color, normal = (None, None) if pictures is None else (pictures.color, pictures.normal)
-    attributes, placed = _vertices(document, group, color is not None, normal is not None, plain)
+    attributes, placed = _vertices(
+        document, group, color is not None, normal is not None, plain, _side(group) / FINE
+    )
     images = [_image(document, color, name, "color"), _image(document, normal, name, "normal")]
     primitive = {
         "attributes": attributes,
@@ -132,6 +137,12 @@ def _indices(document: Document, group: Triangles) -> dict[str, int]:
         return {}
     kind = np.uint16 if count <= SHORT_INDICES else np.uint32
     return {"indices": document.add_accessor(group.indices.astype(kind), ELEMENT_ARRAY_BUFFER)}
+
+
+def _side(group: Triangles) -> float:
+    """Metres: the square root of twice the median area of its triangles."""
+    a, b, c = np.moveaxis(group.positions[group.indices.reshape(-1, 3)], 1, 0)
+    return float(np.sqrt(np.median(np.linalg.norm(np.cross(b - a, c - a), axis=1))))
 
 
 def _shown(

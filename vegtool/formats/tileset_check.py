@@ -1,7 +1,10 @@
 """Whether a tileset.json is what clients can use: containment, errors, files, cycles.
 
 Source: OGC 22-025r4, 3D Tiles 1.1, sections 6.3 to 6.7. Of what the specification allows, only
-boxes and explicit children are known here: what vegtool writes.
+boxes and explicit children are known here: what vegtool writes. Boxes of siblings may overlap, as
+crowns over a border do: 6.3 and 6.7 ask that a tile's box holds those below it, and nothing of
+those beside it. But no file is to be the content of two tiles, as its plants would stand there
+twice.
 """
 
 from __future__ import annotations
@@ -46,10 +49,11 @@ class Box:
 def check_tileset(path: Path) -> list[str]:
     """Everything that is wrong with a tileset and those that it refers to, a sentence each; none
     where all is well."""
-    return list(_check_file(path, ()))
+    return list(_check_file(path, (), {}))
 
 
-def _check_file(path: Path, above: tuple[Path, ...]) -> Iterator[str]:
+def _check_file(path: Path, above: tuple[Path, ...], shown: dict[Path, str]) -> Iterator[str]:
+    """above: the tilesets that refer to it. shown: by which tile each content is."""
     if path.resolve() in above:
         yield f"{path}: refers to itself, by way of {above[-1]}"
         return
@@ -61,14 +65,15 @@ def _check_file(path: Path, above: tuple[Path, ...]) -> Iterator[str]:
     if not isinstance(values, dict) or not isinstance(values.get("root"), dict):
         yield f"{path}: expected an object with a root tile"
         return
-    version = values.get("asset", {}).get("version")
+    version = _object(values, "asset").get("version")
     if version != "1.1":
         yield f"{path}: asset.version: expected 1.1; found {version!r}"
     if not _is_error(values.get("geometricError")):
         yield f"{path}: geometricError: expected a number of at least 0; found none"
     if values["root"].get("refine") not in ("REPLACE", "ADD"):
         yield f"{path}: root: refine: expected REPLACE or ADD; found {values['root'].get('refine')}"
-    yield from _check_tile(path, values["root"], "root", None, None, (*above, path.resolve()))
+    here = (*above, path.resolve())
+    yield from _check_tile(path, values["root"], "root", None, None, here, shown)
 
 
 def _is_error(value: Any) -> bool:
@@ -83,6 +88,7 @@ def _check_tile(
     parent: Box | None,
     parent_error: float | None,
     above: tuple[Path, ...],
+    shown: dict[Path, str],
 ) -> Iterator[str]:
     where = f"{path}: {name}"
     box = _box(tile)
@@ -102,23 +108,29 @@ def _check_tile(
         error = None
     elif parent_error is not None and float(error or 0) > parent_error:
         yield f"{where}: geometricError {error:g} is more than its parent's, {parent_error:g}"
-    yield from _check_content(path, tile, where, above)
+    yield from _check_content(path, tile, where, above, shown)
     children = tile.get("children")
     if children == []:
         yield f"{where}: children: expected some, or none of the key; found an empty list"
+    if children is not None and not isinstance(children, list):
+        yield f"{where}: children: expected a list of tiles; found {children!r:.60}"
+        children = None
     for index, child in enumerate(children or []):
-        yield from _check_tile(path, child, f"{name}.{index}", box, error, above)
+        if not isinstance(child, dict):
+            yield f"{where}: children: expected tiles; found {child!r:.60}"
+            continue
+        yield from _check_tile(path, child, f"{name}.{index}", box, error, above, shown)
 
 
 def _check_content(
-    path: Path, tile: dict[str, Any], where: str, above: tuple[Path, ...]
+    path: Path, tile: dict[str, Any], where: str, above: tuple[Path, ...], shown: dict[Path, str]
 ) -> Iterator[str]:
     content = tile.get("content")
     if content is None:
         if not tile.get("children"):
             yield f"{where}: has neither content nor children"
         return
-    uri = content.get("uri")
+    uri = _object(tile, "content").get("uri")
     if not isinstance(uri, str):
         yield f"{where}: content: expected a uri; found none"
         return
@@ -128,27 +140,42 @@ def _check_content(
     elif file.suffix == ".json":
         if tile.get("children"):
             yield f"{where}: a tile that refers to a tileset has no children"
-        yield from _check_file(file, above)
+        yield from _check_file(file, above, shown)
     else:
         with file.open("rb") as opened:
             head = opened.read(12)
         size = int.from_bytes(head[8:12], "little")
         if head[:4] != MAGIC or size != file.stat().st_size:
             yield f"{where}: content: {file} is no whole .glb file"
+        other = shown.setdefault(file.resolve(), where)
+        if other != where:
+            yield f"{where}: content: {file} is that of {other.removeprefix(f'{path}: ')} too"
 
 
 def _box(tile: dict[str, Any]) -> Box | None:
-    values = tile.get("boundingVolume", {}).get("box")
-    if not isinstance(values, list) or len(values) != 12:
-        return None
-    numbers = np.array(values, np.float64)
-    return Box(numbers[:3], numbers[3:].reshape(3, 3)) if np.isfinite(numbers).all() else None
+    numbers = _numbers(_object(tile, "boundingVolume").get("box"), 12)
+    return None if numbers is None else Box(numbers[:3], numbers[3:].reshape(3, 3))
 
 
 def _matrix(tile: dict[str, Any]) -> FloatArray | None:
     values = tile.get("transform")
     if values is None:
         return np.eye(4)
-    if not isinstance(values, list) or len(values) != 16 or values[15] != 1:
+    numbers = _numbers(values, 16)
+    return None if numbers is None or numbers[15] != 1 else numbers.reshape(4, 4).T
+
+
+def _object(values: dict[str, Any], key: str) -> dict[str, Any]:
+    """What a key holds, if that is an object, else one without keys."""
+    found = values.get(key)
+    return found if isinstance(found, dict) else {}
+
+
+def _numbers(values: Any, count: int) -> FloatArray | None:
+    """(count,), or None for anything but so many finite numbers."""
+    if not isinstance(values, list) or len(values) != count:
         return None
-    return np.array(values, np.float64).reshape(4, 4).T
+    if not all(isinstance(v, int | float) and not isinstance(v, bool) for v in values):
+        return None
+    numbers = np.array(values, np.float64)
+    return numbers if np.isfinite(numbers).all() else None

@@ -69,17 +69,19 @@ def _made(
     world: World, each: Each, run: RunOptions, progress: Progress, out: Path, started: float
 ) -> Result:
     from vegtool.tiles.jobs import Made
+    from vegtool.tiles.journal import locked
     from vegtool.tiles.report import facts_of, text_of
     from vegtool.tiles.run import Run, node_of
 
     only = [node_of(name, world.pyramid) for name in run.only]
-    work = Run(world, each, progress)
-    made = [
-        outcome
-        for outcome in (work.only(only) if only else work.tiles())
-        if isinstance(outcome, Made)
-    ]
-    files = [] if only else work.finish()
+    with locked(out):
+        work = Run(world, each, progress)
+        made = [
+            outcome
+            for outcome in (work.only(only) if only else work.tiles())
+            if isinstance(outcome, Made)
+        ]
+        files = [] if only else work.finish()
     facts = facts_of(world, made, work.failed, out, files, perf_counter() - started)
     failed = tuple(work.failed.values())
     if failed and not any(one.entry.facts.get("plants") for one in made):

@@ -33,6 +33,8 @@ from vegtool.tiles.variation import DRAWS, heights, tints, yaws
 
 FAR_M = 100_000.0
 """Metres: coordinates beyond are a map's, others may be the scene's own."""
+GROUND_M = (-1000.0, 10_000.0)
+"""Metres: no land is lower or higher; what programs write where they know no height mostly is."""
 HALF = 2**30
 """Tiles on either side of the origin."""
 
@@ -101,7 +103,8 @@ def place(scene: Scene, terrain: Terrain, tile_m: float, progress: Progress) -> 
     random = draws(hashes(key(scene.placement.seed or 0), rows.row), DRAWS)
     usual = heights(random, rows.species, scene.species)
     height = np.where(np.isnan(rows.height), usual, rows.height).astype(np.float32)
-    yaw = np.where(np.isnan(rows.yaw), yaws(random), rows.yaw).astype(np.float32)
+    turn = np.remainder(rows.yaw, 2 * np.pi)  # of many turns, float32 would keep too little
+    yaw = np.where(np.isnan(turn), yaws(random), turn).astype(np.float32)
     order, tile = _order(xz, height, tile_m)
     ends = np.flatnonzero(np.diff(tile, append=np.iinfo(np.int64).max)) + 1
     first = np.concatenate([[0], ends])
@@ -138,7 +141,8 @@ def _on_the_map(
         return rows.x, rows.y, origin, terrain.crs or rows.columns.crs
     crs, origin = terrain.crs, terrain.origin
     if crs is None or is_world(crs):
-        place = [(values.min() + values.max()) / 2 for values in (rows.x, rows.y)]
+        around = rows.x - 360 * np.round((rows.x - rows.x[0]) / 360)  # 180 is -180
+        place = [(values.min() + values.max()) / 2 for values in (around, rows.y)]
         if origin is not None:
             place = _degrees(scene, rows, origin)
         zone = zone_at(*place)
@@ -268,6 +272,17 @@ def _ground(terrain: Terrain, rows: Rows, xz: FloatArray, notes: list[str]) -> F
     if not known.any():
         return height
     if terrain.kind == "none":
+        least, most = GROUND_M
+        wrong = np.flatnonzero(known & ((rows.z < least) | (rows.z > most)))
+        if wrong.size:
+            raise rows.table.error(
+                int(rows.row[wrong[0]]),
+                rows.table.names[rows.columns.number["z"]],
+                f"{least:g} to {most:g} m",
+                float(rows.z[wrong[0]]),
+                "leave it empty where it is not known, or say the column's unit with units in "
+                "[placement]",
+            )
         if not known.all():
             count = int(np.count_nonzero(~known))
             notes.append(f"{rows.table.path}: plants without z, which stand at height 0: {count:,}")

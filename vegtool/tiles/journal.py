@@ -7,11 +7,12 @@ was made from; where the key is still the same, and the files are there, the par
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
 from hashlib import blake2b
-from pathlib import Path
+from pathlib import Path, PurePath
 from secrets import token_hex
 from typing import Any
 
@@ -19,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 import vegtool
+from vegtool.errors import OutputError
 from vegtool.formats.atomic import explained
 
 JOURNAL = "journal.jsonl"
@@ -66,7 +68,8 @@ def key_of(*values: Hashed) -> str:
 
 def read_journal(folder: Path) -> dict[str, Entry]:
     """Entries by their names, the last of each; none where there is no journal. A line that is not
-    whole, as where a run was killed, counts for nothing."""
+    whole, as where a run was killed, counts for nothing, nor does one of files elsewhere, which
+    nobody is to remove."""
     try:
         lines = (folder / JOURNAL).read_bytes().splitlines()
     except OSError:
@@ -75,10 +78,56 @@ def read_journal(folder: Path) -> dict[str, Entry]:
     for line in lines:
         try:
             entry = Entry(**json.loads(line))
+            outside = any(".." in (path := PurePath(n)).parts or path.anchor for n in entry.files)
         except (ValueError, TypeError):
             continue
-        found[entry.name] = entry
+        if not outside:
+            found[entry.name] = entry
     return found
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Nobody else makes tiles in a folder meanwhile, where the system can tell (not on Windows, nor
+    on some disks of a network). The folder is made; where nothing was written, it goes again.
+
+    Raises OutputError where somebody does. Whoever is killed holds nothing.
+    """
+    with explained(folder):
+        new = not folder.exists()
+        folder.mkdir(parents=True, exist_ok=True)
+    try:
+        with _locked(folder):
+            yield
+    finally:
+        if new:
+            with suppress(OSError):
+                folder.rmdir()
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    try:
+        import fcntl
+    except ImportError:  # on Windows
+        yield
+        return
+    with explained(folder):
+        number = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(number)
+        raise OutputError(
+            f"{folder}: another run of vegtool tiles is at work there. Wait for it, or choose "
+            "another place."
+        ) from None
+    except OSError:
+        pass
+    try:
+        yield
+    finally:
+        os.close(number)
 
 
 @contextmanager

@@ -23,7 +23,9 @@ TABLES = "species.toml"
 KEYS = {
     "model": Key("text", "file or folder of the plant; by default what has the species' name"),
     "aliases": Key("names", "other names that inventories and scenes call it"),
-    "height_m": Key("range", "of plants whose height the inventory does not say", above=0),
+    "height_m": Key(
+        "range", "of plants whose height the inventory does not say", least=0.001, most=1000
+    ),
     "unit": Key("text", "of the model, as --unit of convert"),
     "up": Key("text", "its upward axis, as --up", choices=UP_AXES),
     "leaf_material": Key("names", "its materials that are leaves, as --leaf-material"),
@@ -118,9 +120,12 @@ class Library:
         Raises UsageError where an alias is the name of another plant.
         """
         entries = list(dict.fromkeys(self.entries.values()))
-        taken = {entry.model.resolve() for entry in entries if entry.model is not None}
+        named = [entry.model.resolve() for entry in entries if entry.model is not None]
+        taken = {*named, *(one.parent for one in named)}
         names = {same(entry.name): entry.name for entry in entries}
-        there = [*self.manifests, *self.models, *filter(_holds_plants, self.folders)]
+        converted = {same(stem(one)) for one in self.manifests}
+        models = [one for one in self.models if same(stem(one)) not in converted]
+        there = [*self.manifests, *models, *filter(_holds_plants, self.folders)]
         for path in there:
             name = path.name if path in self.folders else stem(path)
             if path.resolve() in taken or same(name) in names:

@@ -58,10 +58,11 @@ def _decoded(path: Path) -> tuple[str, tuple[str, ...]]:
 
 
 def _rows(path: Path, text: str, separator: str) -> Iterator[list[str]]:
-    """All rows but empty ones, the header among them."""
+    """All rows but empty ones, the header among them; those that spreadsheets leave below a table
+    have separators, and no values."""
     reader = _reader(text, separator)
     try:
-        yield from filter(None, reader)
+        yield from filter(any, reader)
     except csv.Error as error:
         raise InputError(
             f"{path}, line {reader.line_num:,}: expected values between {separator!r}, found what "
@@ -72,7 +73,7 @@ def _rows(path: Path, text: str, separator: str) -> Iterator[list[str]]:
 def _line(text: str, separator: str, row: int) -> int:
     """In which line a row ends: counted anew, as it is only asked of a broken one."""
     reader = _reader(text, separator)
-    next(islice(filter(None, reader), row, None), None)
+    next(islice(filter(any, reader), row, None), None)
     return int(reader.line_num)
 
 

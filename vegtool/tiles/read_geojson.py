@@ -75,6 +75,11 @@ def _crs(document: dict[str, Any]) -> str | None:
     return f"EPSG:{match[1]}" if match else None
 
 
+def _value(value: Any) -> Value:
+    """What a property may be here: of lists, objects, true and false, the text."""
+    return json.dumps(value) if isinstance(value, bool | list | dict) else value
+
+
 def _coordinates(path: Path, row: int, feature: Any) -> list[float]:
     """The position of a feature."""
     geometry = feature.get("geometry") if isinstance(feature, dict) else None
@@ -106,8 +111,3 @@ def _properties(path: Path, row: int, feature: dict[str, Any]) -> dict[str, Any]
             f"{json.dumps(found):.60}; correct or remove it"
         )
     return found or {}
-
-
-def _value(found: Any) -> Value:
-    """A property; one of several values is none that an inventory can have, and told as text."""
-    return json.dumps(found) if isinstance(found, list | dict) else found

@@ -29,7 +29,7 @@ from vegtool.lod import Display, Level, Triangles, level_triangles
 from vegtool.measure.metrics import LUMINANCE, reference
 from vegtool.measure.pictures import truth
 from vegtool.measure.scores import Truths
-from vegtool.measure.views import View, around, direction
+from vegtool.measure.views import CLOSEST, View, around, direction
 from vegtool.plant import Material, Plant
 from vegtool.refine.color import LEAST_GAIN, MOST_GAIN, scaled, unbiased_color
 from vegtool.refine.coverage import solve_coverage, with_alpha
@@ -70,6 +70,8 @@ errs by 0.129, 0.124 and 0.116 (FLIP), in 3.7, 4.1 and 5.6 s."""
 DRAWN = VIEWS[:2]
 """Those from which pictures are drawn: from opposite sides, since one is in the shade. From above a
 square covers what it covers, and fills ten times the pixels."""
+OUTSIDE = 1.001
+"""Times the nearest distance that a view of all of a group may have."""
 PER_BILLBOARD = 2
 """Triangles."""
 
@@ -258,8 +260,11 @@ def covering(level: Level, truths: Truths, gutter: int) -> Level:
 
 def looks(buffers: PlantBuffers, distance_m: float, display: Display) -> Truths:
     """How a group looks from afar, with a sample to the pixel: of thousands of pixels only the
-    means count, which are right within 0.1 %."""
+    means count, which are right within 0.1 %. A square on a cliff is looked at from where all of it
+    is before the eye."""
     plant = buffers.plant
+    radius = float(np.linalg.norm(np.ptp(plant.bounds, axis=0))) / 2
+    distance_m = max(distance_m, OUTSIDE * CLOSEST * radius)
     light = Light(direction=SUN)
     box = np.stack(np.meshgrid(*plant.bounds.T), axis=-1).reshape(-1, 3)
     cameras = tuple(around(box, view.direction, distance_m, display) for view in DRAWN)

@@ -28,6 +28,8 @@ READERS = {
 
 TALLEST_M = 150.0
 """Metres; the tallest trees known have 116."""
+LOWEST_M = 0.001
+"""Metres: a plant that is lower has no height that anybody measured."""
 FARTHEST_M = 1e9
 """Metres from the map's origin: beyond, float64 is not a millimetre any more."""
 
@@ -87,10 +89,11 @@ def read_rows(scene: Scene) -> Rows:
         raise InputError(f"{table.path}: expected a row for each plant, found none; add some")
     whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     notes = [*table.notes, *columns.notes]
-    nothing = int(np.count_nonzero(whole["height"] == 0))
-    if nothing:
-        whole["height"][whole["height"] == 0] = np.nan
-        notes.append(f"{table.path}: plants of height 0, taken as not known: {nothing:,}")
+    nothing = whole["height"] < LOWEST_M
+    if nothing.any():
+        whole["height"][nothing] = np.nan
+        count = int(np.count_nonzero(nothing))
+        notes.append(f"{table.path}: plants of height 0, taken as not known: {count:,}")
     if columns.ignored:
         notes.append(f"{table.path}: columns that are not used: {', '.join(columns.ignored)}")
     return Rows(**whole, row=np.arange(1, first), table=table, columns=columns, notes=tuple(notes))
