@@ -60,8 +60,8 @@ STATIONS = (
     Station("above", (0.0, 250.0, 150.0), 0.0, -60.0, None),
 )
 """A walker 3 m before the plants; one between them, whose eye is in a conifer's branch; one on a
-hill 120 m before them; one 700 m away; one above, of whom nothing is asked: there the truth itself, blurred by two pixels,
-errs by 0.095."""
+hill 120 m before them; one 700 m away; one above, of whom nothing is asked: there the truth itself,
+blurred by two pixels, errs by 0.095."""
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ METHODS: dict[str, tuple[str, str]] = {
     "branches": ("branches:branches", "along the branches, so that trunks stay whole"),
     "isodata": ("isodata:isodata", "long and thin, split and merged by size"),
     "kmeans": ("kmeans:kmeans", "compact"),
+    "planes": ("plane_space:planes", "near one plane each, wherever on it"),
 }
 """Name -> (module:function within this room, what its clusters are like)."""
 
