@@ -9,7 +9,7 @@ options that `vegtool tiles` has.
 
 whole: the command, from a converted library to the tileset: seconds, memory, bytes, by height.
 merge: merging and writing alone. scale: 10,000, 100,000 and 1,000,000 plants. single: one tile of a
-landscape of 10 x 10 km. error: FLIP of what clients draw at four stations. rebaked: squares
+landscape of 10 x 10 km. error: FLIP of what clients draw at five stations. rebaked: squares
 clustered anew beside a subsample of their quarters.
 
 Converted plants, tiles and pictures of the truth are kept in --cache. What is missed of what is

@@ -2,7 +2,7 @@
 
 Source: OGC 22-025r4, 3D Tiles 1.1, sections 6.3 to 6.7. Of what the specification allows, only
 boxes and explicit children are known here: what vegtool writes. Boxes of siblings may overlap, as
-crowns over a border do: 6.3 and 6.7 ask that a tile's box holds those below it, and nothing of
+crowns over a border do: it asks that a tile's box holds those below it, and nothing of
 those beside it. But no file is to be the content of two tiles, as its plants would stand there
 twice.
 """
