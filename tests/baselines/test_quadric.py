@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from baselines.baseline_cases import cards, plant_from, sphere, together, tube
 
-from vegtool.baselines.quadric import quadric, roots, shares
+from vegtool.baselines.quadric import quadric, shares
 from vegtool.baselines.thinning import GROWTH
 from vegtool.formats import read_plant
+from vegtool.meshes.collapse import roots
 from vegtool.plant import Plant
 
 

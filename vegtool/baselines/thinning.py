@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from vegtool.arrays import FloatArray, IntArray
-from vegtool.baselines.pieces import Surface, pieces
+from vegtool.meshes.pieces import Surface, pieces
 from vegtool.seeding import generator
 
 GROWTH = 0.4

@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from vegtool.arrays import FloatArray, IntArray
 from vegtool.lod import Billboards
+from vegtool.meshes.distance import to_triangles
 from vegtool.plant import Plant
 
 SAMPLES = 65536
@@ -75,25 +76,8 @@ def distance_to_mesh(points: FloatArray, mesh: Plant) -> FloatArray:
     _, near = cKDTree(samples).query(points, NEAREST)
     nearest = np.full(len(points), np.inf)
     for candidate in face[near].T:
-        nearest = np.minimum(nearest, _to_triangles(points, mesh.corners[candidate]))
+        nearest = np.minimum(nearest, to_triangles(points, mesh.corners[candidate]))
     return nearest
-
-
-def _to_triangles(points: FloatArray, corners: FloatArray) -> FloatArray:
-    """(n,) from points (n, 3) to their triangles (n, 3, 3): to the plane above the inside, else to
-    the nearest edge (Ericson, Real-Time Collision Detection, 2005, section 5.1)."""
-    edges = np.roll(corners, -1, axis=1) - corners
-    offset = points[:, None] - corners
-    square = np.einsum("nci,nci->nc", edges, edges)
-    along = np.einsum("nci,nci->nc", offset, edges)
-    share = np.clip(np.divide(along, square, out=np.zeros_like(along), where=square > 0), 0, 1)
-    nearest = np.linalg.norm(offset - share[..., None] * edges, axis=-1).min(axis=1)
-    normal = np.cross(edges[:, 0], edges[:, 1])
-    length = np.linalg.norm(normal, axis=1)
-    inward = np.cross(normal[:, None], edges)
-    above = (np.einsum("nci,nci->nc", offset, inward) >= 0).all(axis=1) & (length > 0)
-    height = np.abs(np.einsum("ni,ni->n", offset[:, 0], normal))
-    return np.asarray(np.divide(height, length, out=nearest, where=above))
 
 
 def surface_samples(plant: Plant, count: int) -> tuple[IntArray, FloatArray]:

@@ -2,9 +2,8 @@
 
 Source: OGC 22-025r4, 3D Tiles 1.1, sections 6.3 to 6.7. Of what the specification allows, only
 boxes and explicit children are known here: what vegtool writes. Boxes of siblings may overlap, as
-crowns over a border do: it asks that a tile's box holds those below it, and nothing of
-those beside it. But no file is to be the content of two tiles, as its plants would stand there
-twice.
+crowns over a border do: it asks that a tile's box holds those below it, and nothing of those beside
+it. But no file is to be the content of two tiles, as its plants would stand there twice.
 """
 
 from __future__ import annotations

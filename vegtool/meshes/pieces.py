@@ -51,6 +51,17 @@ def welded(plant: Plant, material: int) -> Surface:
     return Surface(local[first], faces[whole], corners[whole])
 
 
+def all_welded(plant: Plant) -> Surface:
+    """All faces of a plant, in its order, with vertices of one material at one position made one;
+    faces without area stay."""
+    local = (plant.positions - plant.center) / (plant.radius or 1.0)
+    cell = np.rint(local / WELD).astype(np.int64)[plant.faces].reshape(-1, 3)
+    key = np.column_stack([cell, np.repeat(plant.face_material, 3)])
+    _, first, place = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    positions = local[plant.faces.ravel()[first]]
+    return Surface(positions, place.reshape(-1, 3).astype(np.int32), plant.faces)
+
+
 def pieces(faces: npt.NDArray[np.integer]) -> tuple[int, IntArray]:
     """How many connected pieces the triangles (n, 3) form, and (n,) int32 the piece of each."""
     if not len(faces):

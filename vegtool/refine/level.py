@@ -207,14 +207,20 @@ def on_planes(
         # all of it stands in the file twice, once for each side
         once = wanted.triangles // 2 - (wanted.triangles - triangles)
         level, labels = baked(source, wanted, wood, once, by_mesh, seconds, progress)
+    return Made(as_measured(source, wanted, level, seconds, progress), labels, by_mesh)
+
+
+def as_measured(
+    source: Source, wanted: Wanted, level: Level, seconds: dict[str, float], progress: Progress
+) -> Level:
+    """A level whose alpha is mean coverage, with coverage and colour as the plant's."""
     progress("coverage", 0.6)
     with timed(seconds, "coverage"):
         truths = [source.truth_at(metres) for metres in (wanted.near_m, wanted.far_m)]
         level = solve_coverage(level, truths, BakeOptions().gutter, reach=REACH).level
     progress("color", 0.7)
     with timed(seconds, "color"):
-        level = unbiased_color(level, source.truth_at(wanted.near_m))
-    return Made(level, labels, by_mesh)
+        return unbiased_color(level, source.truth_at(wanted.near_m))
 
 
 def baked(

@@ -1,0 +1,1 @@
+"""Surfaces in connected pieces, and made of fewer triangles."""
