@@ -1,0 +1,85 @@
+"""Clusters that share planes, wherever on them they are.
+
+Décoret, Durand, Sillion, Dorsey: Billboard clouds for extreme model simplification (2003).
+
+How far faces may move onto a plane, epsilon, is about the least with which the planes are no more
+than asked for (`plane_cover.py`): their number is taken to fall with its square. What they fall
+short of the number, the largest clusters are cut in two, which saves empty texels.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vegtool.arrays import IntArray, unit
+from vegtool.clustering import ClusterOptions
+from vegtool.clustering.features import Labels, face_weights, own_corners, samples
+from vegtool.clustering.partition import compacted, split
+from vegtool.clustering.plane_cover import GRID, Cover, Pieces, cover
+from vegtool.plant import Plant
+from vegtool.progress import Progress, silent
+
+FIRST = 0.25
+"""Radii times the root of the number of planes: the first epsilon that is tried; foliage takes
+0.36, smooth bodies 0.07."""
+FILLED = 0.9
+"""Of the number of planes: as many are enough."""
+TRIES = 8
+"""That many epsilons, at most."""
+TOO_MANY = 4
+"""Times the number of planes: no more are sought."""
+FINEST, ALL = 1e-7, 2.0
+"""Radii: epsilon lies between."""
+BRACKETED = 1.02
+"""Times an epsilon that is too small, one that is not is small enough."""
+
+
+def planes(
+    plant: Plant, count: int, options: ClusterOptions, seed: int, progress: Progress
+) -> IntArray:
+    """(f,) int32 labels of at most `count` clusters, each near one plane. Nothing is random."""
+    points = samples(plant, options.orientation_scale(count), count)
+    pieces, _ = pieces_of(plant, points.of_face)
+    labels = compacted(planes_for(pieces, count, progress).labels)
+    labels = split(points.points, points.weights, labels, min(count, len(points.points)))
+    return np.asarray(labels[points.of_face], dtype=np.int32)
+
+
+def pieces_of(plant: Plant, of_face: Labels) -> tuple[Pieces, np.ndarray]:
+    """The faces of each piece as one, in the plant's own frame, and the axes (3, 3) of that."""
+    corners, axes = own_corners(plant)
+    edges = corners[:, 1:] - corners[:, :1]
+    normal = unit(np.cross(edges[:, 0], edges[:, 1]))
+    order = np.argsort(of_face, kind="stable")
+    first = np.flatnonzero(np.diff(of_face[order], prepend=-1))
+    weight = face_weights(plant)[order]
+    area = weight[:, None] * normal[order]
+    bare = np.where(area.any(axis=1), 0.0, weight)
+    own = np.ascontiguousarray(corners[order].swapaxes(0, 1))
+    return Pieces(own, first, area, bare), axes
+
+
+def planes_for(pieces: Pieces, count: int, progress: Progress = silent) -> Cover:
+    """At most `count` planes near all pieces, by about the least epsilon that allows it."""
+    best = one_plane(pieces)
+    epsilon, fails, fits = FIRST / count**0.5, FINEST, ALL
+    for nth in range(TRIES):
+        if len(best.normal) >= FILLED * count or fits <= BRACKETED * fails:
+            break
+        progress("planes", nth / TRIES)
+        found = cover(pieces, epsilon, TOO_MANY * count)
+        number = TOO_MANY * count if found is None else len(found.normal)
+        if found is not None and number <= count:
+            best, fits = found, epsilon
+        else:
+            fails = epsilon
+        epsilon *= (2 * number / ((1 + FILLED) * count)) ** 0.5
+        if not fails < epsilon < fits:
+            epsilon = (fails * fits) ** 0.5
+    return best
+
+
+def one_plane(pieces: Pieces) -> Cover:
+    """Through the middle, across the direction in which most area is projected."""
+    nth = int(pieces.projected(GRID).sum(axis=1).argmax())
+    return Cover(np.zeros(len(pieces), dtype=np.int64), GRID[nth][None], np.zeros(1))
