@@ -249,16 +249,14 @@ def alone(grid: Grid) -> tuple[Labels, FloatArray, float]:
 def densest_offsets(
     low: FloatArray, high: FloatArray, area: FloatArray, reach: float
 ) -> tuple[FloatArray, FloatArray]:
-    """(d,) the greatest density along each direction, and its offset."""
-    at, change = [], []
-    for begin, end, worth in intervals(low, high, area, reach):
-        worth = np.where(begin <= end, worth, 0.0)
-        at += [begin, np.nextafter(end, np.inf)]
-        change += [worth, -worth]
-    ends, steps = np.concatenate(at, axis=1), np.concatenate(change, axis=1)
-    order = np.argsort(ends, axis=1, kind="stable")
+    """(d,) the most area that is valid for one plane along each direction, and its offset."""
+    first, last = high - reach, low + reach
+    worth = np.where(first <= last, area, 0.0)
+    ends = np.concatenate([first, np.nextafter(np.maximum(first, last), np.inf)], axis=1)
+    order = np.argsort(ends, axis=1)
     ends = np.take_along_axis(ends, order, axis=1)
-    density = np.cumsum(np.take_along_axis(steps, order, axis=1), axis=1)
+    steps = np.take_along_axis(np.concatenate([worth, -worth], axis=1), order, axis=1)
+    density = np.cumsum(steps, axis=1)
     density[:, :-1][ends[:, 1:] == ends[:, :-1]] = -np.inf  # not all that begins there is in it
     best, rows = density.argmax(axis=1), np.arange(len(ends))
     return density[rows, best], ends[rows, best]

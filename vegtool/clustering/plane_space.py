@@ -22,11 +22,13 @@ from vegtool.progress import Progress, silent
 FIRST = 0.25
 """Radii times the root of the number of planes: the first epsilon that is tried; foliage takes
 0.36, smooth bodies 0.07."""
-FILLED = 0.9
+FILLED = 0.85
 """Of the number of planes: as many are enough."""
+SOME = 1 << 11
+"""Pieces, every nth, among which epsilon is sought first."""
 TRIES = 8
 """That many epsilons, at most."""
-TOO_MANY = 4
+TOO_MANY = 2
 """Times the number of planes: no more are sought."""
 FINEST, ALL = 1e-7, 2.0
 """Radii: epsilon lies between."""
@@ -61,8 +63,17 @@ def pieces_of(plant: Plant, of_face: Labels) -> tuple[Pieces, np.ndarray]:
 
 def planes_for(pieces: Pieces, count: int, progress: Progress = silent) -> Cover:
     """At most `count` planes near all pieces, by about the least epsilon that allows it."""
-    best = one_plane(pieces)
-    epsilon, fails, fits = FIRST / count**0.5, FINEST, ALL
+    epsilon = FIRST / count**0.5
+    if len(pieces) > SOME:
+        some = pieces.of(np.arange(0, len(pieces), -(-len(pieces) // SOME)))
+        _, epsilon = _search(some, count, epsilon, lambda _, f: progress("planes", f / 3))
+    found, _ = _search(pieces, count, epsilon, lambda _, f: progress("planes", (1 + 2 * f) / 3))
+    return found
+
+
+def _search(pieces: Pieces, count: int, epsilon: float, progress: Progress) -> tuple[Cover, float]:
+    """The planes, and their epsilon; what is given is tried first."""
+    best, fails, fits = one_plane(pieces), FINEST, ALL
     for nth in range(TRIES):
         if len(best.normal) >= FILLED * count or fits <= BRACKETED * fails:
             break
@@ -76,7 +87,7 @@ def planes_for(pieces: Pieces, count: int, progress: Progress = silent) -> Cover
         epsilon *= (2 * number / ((1 + FILLED) * count)) ** 0.5
         if not fails < epsilon < fits:
             epsilon = (fails * fits) ** 0.5
-    return best
+    return best, fits
 
 
 def one_plane(pieces: Pieces) -> Cover:

@@ -13,7 +13,7 @@ from vegtool.plant import Material, Plant
 
 @dataclass(frozen=True, eq=False)
 class ColoredMesh:
-    """A mesh of v vertices and t triangles, to be drawn from both sides.
+    """A mesh of v vertices and t triangles.
 
     positions: (v, 3) metres. normals: (v, 3) unit. colors: (v, 3) linear. faces: (t, 3) int32.
     """
@@ -34,11 +34,13 @@ class ColoredMesh:
 
 @dataclass(frozen=True, eq=False)
 class Scattering:
-    """What a mesh's material says of light: unlit, or a share that passes through, (3,) tinted."""
+    """What a mesh's material says of light: unlit, or a share that passes through, (3,) tinted; and
+    whether it is drawn from both sides."""
 
     unlit: bool = False
     transmission: float = 0.0
     tint: FloatArray = field(default_factory=lambda: np.ones(3))
+    double_sided: bool = True
 
 
 def joined(
@@ -48,15 +50,15 @@ def joined(
 ) -> Plant | None:
     """All parts as a plant, as `Level.mesh` wants it; None where no part has a face.
 
-    scattering: of each part, or none. Parts alike in it share an opaque, double-sided material, and
-    a client draws them by one call.
+    scattering: of each part, or none. Parts alike in it share an opaque material, and a client draws
+    them by one call.
     """
     told = scattering or [Scattering()] * len(parts)
     both = [(p, s) for p, s in zip(parts, told, strict=True) if p is not None and len(p.faces)]
     if not both:
         return None
     some = [part for part, _ in both]
-    kinds = [(s.unlit, s.transmission) for _, s in both]
+    kinds = [(s.unlit, s.transmission, s.double_sided) for _, s in both]
     first_of = {kind: index for index, kind in reversed(list(enumerate(kinds)))}
     order = sorted(first_of.values())
     number = [order.index(first_of[kind]) for kind in kinds]
@@ -74,7 +76,7 @@ def joined(
         tuple(
             Material(
                 name if len(order) == 1 else f"{name}_{i}",
-                double_sided=True,
+                double_sided=both[i][1].double_sided,
                 unlit=both[i][1].unlit,
                 transmission=both[i][1].transmission,
                 transmission_tint=both[i][1].tint,

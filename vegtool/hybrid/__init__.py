@@ -1,0 +1,1 @@
+"""Hybrids: part mesh, part billboards, by what they cost."""

@@ -1,0 +1,82 @@
+"""The billboard cloud that a hybrid starts from: planes that pass every face within a distance.
+
+"Hybrid billboard clouds" (sketch), section 2: "We start by generating a billboard cloud
+representation of the original model [Décoret et al. 2003]."
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from vegtool.arrays import FloatArray, IntArray, unit
+from vegtool.clustering.features import samples
+from vegtool.clustering.plane_space import pieces_of, planes_for
+from vegtool.hybrid.cost import misplaced
+from vegtool.hybrid.shown import pictured, shown_fraction
+from vegtool.plant import Plant
+from vegtool.progress import Progress, silent
+
+
+@dataclass(frozen=True, eq=False)
+class Cloud:
+    """k planes near the faces of a plant, some of which several planes show.
+
+    face, plane: (q,) int32 pairs: the plane shows the face; sorted by plane. normal: (k, 3) unit.
+    reach: radii that no face is moved by more than.
+    """
+
+    plant: Plant
+    face: IntArray
+    plane: IntArray
+    normal: FloatArray
+    reach: float
+
+    @cached_property
+    def shown(self) -> Plant:
+        """The plant with a face for each pair, as baking wants it: a label for each is `plane`."""
+        return replace(
+            self.plant,
+            faces=self.plant.faces[self.face],
+            face_material=self.plant.face_material[self.face],
+            branches=None,
+        )
+
+    @cached_property
+    def wrong(self) -> FloatArray:
+        """(f,) 0 to 1 how wrong each face is drawn: displaced, or not shown from all around."""
+        plant, count = self.plant, len(self.plant.faces)
+        radius = plant.radius or 1.0
+        normals = unit(plant.face_area_vectors / radius**2)
+        height = self.heights()
+        away = np.full(count, np.inf)
+        np.minimum.at(away, self.face, np.abs(height).mean(axis=1))
+        pictures = np.zeros((count, pictured(normals[:1], self.normal[:1]).shape[1]))
+        np.add.at(pictures, self.face, pictured(normals[self.face], self.normal[self.plane]))
+        unshown = 1 - shown_fraction(normals, pictures)
+        return np.asarray(np.clip(misplaced(away, self.reach) + unshown, 0.0, 1.0))
+
+    def heights(self) -> FloatArray:
+        """(q, 3) radii of the corners of each pair's face over its plane, which lies halfway
+        between the outermost ones."""
+        plant = self.plant
+        corners = (plant.corners[self.face] - plant.center) / (plant.radius or 1.0)
+        height = np.einsum("qci,qi->qc", corners, self.normal[self.plane])
+        first = np.flatnonzero(np.diff(self.plane, prepend=-1))
+        low = np.minimum.reduceat(height.min(axis=1), first)
+        high = np.maximum.reduceat(height.max(axis=1), first)
+        return np.asarray(height - ((low + high) / 2)[self.plane][:, None])
+
+
+def cloud_of(plant: Plant, count: int, progress: Progress = silent) -> Cloud:
+    """At most `count` planes that together pass all faces, by about the least distance that allows
+    it."""
+    of_face = samples(plant, 0.0, 1).of_face
+    pieces, axes = pieces_of(plant, of_face)
+    found = planes_for(pieces, count, progress)
+    label = found.labels[of_face]
+    order = np.argsort(label, kind="stable").astype(np.int32)
+    cloud = Cloud(plant, order, label[order].astype(np.int32), found.normal @ axes, 1.0)
+    return replace(cloud, reach=float(np.abs(cloud.heights()).max()))
