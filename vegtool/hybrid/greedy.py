@@ -142,7 +142,7 @@ class Descent:
     def shown_by(self, plane: int) -> Labels:
         """The faces of a billboard that may leave it."""
         faces = self.cloud.face[self.pairs[plane]].astype(np.int64)
-        return faces[self.solid[faces]]
+        return np.asarray(faces[self.solid[faces]])
 
     def better_alone(self, faces: Labels) -> Labels:
         """Those in connected parts that cost less as triangles than on billboards, of no thought

@@ -50,8 +50,8 @@ def joined(
 ) -> Plant | None:
     """All parts as a plant, as `Level.mesh` wants it; None where no part has a face.
 
-    scattering: of each part, or none. Parts alike in it share an opaque material, and a client draws
-    them by one call.
+    scattering: of each part, or none. Parts alike in it share an opaque material, and a client
+    draws them by one call.
     """
     told = scattering or [Scattering()] * len(parts)
     both = [(p, s) for p, s in zip(parts, told, strict=True) if p is not None and len(p.faces)]
