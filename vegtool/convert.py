@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from vegtool.baking.bake import PlantBuffers
     from vegtool.gl.pictures import BakedLight
     from vegtool.measure.scores import TruthsAt
+    from vegtool.refine.level import Source
 
 LEVEL_RATIO = 2
 """Each level has half the billboards of the one before, for half its size on the screen."""
@@ -62,6 +63,10 @@ MOST_BILLBOARDS = 100_000
 PLAIN = ("method", "orientation_weight", "shape")
 """Options of the plain method alone."""
 
+HYBRID = "hybrid"
+OF_HYBRIDS = ("weights", "triangles", "fill", "proposals")
+"""Options of that method alone."""
+
 TRIANGLES_PER_BILLBOARD = 2
 """At least: four where both sides have pictures of their own."""
 
@@ -77,9 +82,35 @@ class ConvertOptions:
         "branches",
         "What clusters of --refine none are like. "
         + "; ".join(f"{k}: {v}" for k, (_, v) in METHODS.items())
-        + ".",
-        choices=tuple(METHODS),
+        + f". Or, with --refine full, {HYBRID}: planes of which those that are dearer than the "
+        "triangles they show give way to a mesh.",
+        choices=(*METHODS, HYBRID),
         short="m",
+    )
+    weights: str | None = option(
+        None,
+        "Of what a hybrid costs: error=1,polygons=1,fill=0.1, all three as shares of the "
+        "original's; what is not named is so [as its triangles allow].",
+        metavar="NAME=NUMBER,...",
+    )
+    triangles: int | None = option(
+        None,
+        "Triangles of the first hybrid level, at most, and half as many of each next one [two for "
+        "each of --billboards].",
+        least=2,
+        most=TRIANGLES_PER_BILLBOARD * MOST_BILLBOARDS,
+    )
+    fill: float | None = option(
+        None,
+        "Fragments of a hybrid level, hidden ones included, as a share of the original's, at most.",
+        least=0.0,
+        most=1e6,
+    )
+    proposals: str = option(
+        "all",
+        "What is looked at for each step of a hybrid: all billboards, or only the costliest, which "
+        "is faster and stops sooner.",
+        choices=("all", "costliest"),
     )
     billboards: int = option(
         512,
@@ -176,9 +207,23 @@ class ConvertOptions:
     seed: int = option(0, "Seed of every random choice.", least=0)
 
     def __post_init__(self) -> None:
-        for item in (item for item in fields(self) if item.name in PLAIN):
-            if self.refine != "none" and getattr(self, item.name) != item.default:
+        hybrid = self.method == HYBRID
+        changed = [item for item in fields(self) if getattr(self, item.name) != item.default]
+        for item in changed:
+            if item.name in PLAIN and self.refine != "none" and not hybrid:
                 raise UsageError(f"{flag_of(item)}: is the plain method's; add --refine none")
+            if item.name in OF_HYBRIDS and not hybrid:
+                raise UsageError(f"{flag_of(item)}: is of hybrids alone; add --method {HYBRID}")
+        if hybrid and self.refine != "full":
+            raise UsageError(f"--method {HYBRID}: goes with --refine full; leave --refine out")
+        if self.weights is not None:
+            from vegtool.hybrid.options import Weights
+
+            Weights.read(self.weights)
+            if self.triangles is not None or self.fill is not None:
+                raise UsageError(
+                    "--weights: say what a hybrid costs, or what it may have: --triangles, --fill"
+                )
         if self.sun is not None:
             if not self.prelit:
                 raise UsageError("--sun: is where the light of --prelit comes from; add --prelit")
@@ -345,6 +390,8 @@ def level_maker(
     from vegtool.refine.level import Wanted, refined_level, source_of
 
     source = source_of(buffers, truth_at, lit)
+    if options.method == HYBRID:
+        return partial(_hybrid, source, options)
 
     def make(count: int, near_m: float, progress: Progress) -> Level:
         most = TRIANGLES_PER_BILLBOARD * count
@@ -354,6 +401,21 @@ def level_maker(
         return refined_level(source, wanted, progress)
 
     return make
+
+
+def _hybrid(
+    source: Source, options: ConvertOptions, count: int, near_m: float, progress: Progress = silent
+) -> Level:
+    """A hybrid level, of at most twice as many triangles as `count`, or as its weights have it."""
+    from vegtool.hybrid.level import hybrid_level
+    from vegtool.hybrid.options import Budget, Weights
+    from vegtool.refine.level import Wanted
+
+    most = TRIANGLES_PER_BILLBOARD * count
+    wanted = Wanted(most, near_m, options.max_texture, options.seed)
+    told = options.weights
+    aim = Budget(most, options.fill) if told is None else Weights.read(told)
+    return hybrid_level(source, wanted, aim, options.proposals == "costliest", progress)
 
 
 def billboard_level(
@@ -407,7 +469,10 @@ def billboard_level(
 
 def billboard_counts(plant: Plant, options: ConvertOptions) -> list[int]:
     """Planes per level, finest first: half each time, never more than the plant can use."""
-    first = min(options.billboards, most_billboards(plant))
+    asked = options.billboards
+    if options.triangles is not None:
+        asked = max(1, options.triangles // TRIANGLES_PER_BILLBOARD)
+    first = min(asked, most_billboards(plant))
     return [max(1, round(first / LEVEL_RATIO**i)) for i in range(options.levels)]
 
 

@@ -58,6 +58,13 @@ class Cloud:
         unshown = 1 - shown_fraction(normals, pictures)
         return np.asarray(np.clip(misplaced(away, self.reach) + unshown, 0.0, 1.0))
 
+    def of(self, pairs: IntArray) -> Cloud:
+        """Some pairs, (r,) sorted, and the planes that these have."""
+        used, plane = np.unique(self.plane[pairs], return_inverse=True)
+        return replace(
+            self, face=self.face[pairs], plane=plane.astype(np.int32), normal=self.normal[used]
+        )
+
     def heights(self) -> FloatArray:
         """(q, 3) radii of the corners of each pair's face over its plane, which lies halfway
         between the outermost ones."""

@@ -14,21 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from vegtool.arrays import FloatArray
+from vegtool.hybrid.options import Weights
 
 DISPLACED = 0.5
 """What costs a surface that is drawn as far from its place as a plane may move it, if one that is
 not shown costs 1; so does one twice as far away."""
 PER_BILLBOARD = 2
 """Triangles."""
-
-
-@dataclass(frozen=True)
-class Weights:
-    """Of the three terms."""
-
-    error: float = 1.0
-    polygons: float = 1.0
-    fill: float = 0.1
 
 
 @dataclass(frozen=True)

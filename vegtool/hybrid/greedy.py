@@ -29,7 +29,8 @@ import numpy as np
 from vegtool.arrays import FloatArray, IntArray
 from vegtool.clustering.features import Labels
 from vegtool.hybrid.cloud import Cloud
-from vegtool.hybrid.cost import PER_BILLBOARD, Terms, Weights
+from vegtool.hybrid.cost import PER_BILLBOARD, Terms
+from vegtool.hybrid.options import Weights
 from vegtool.hybrid.reduction import FEWEST, Reductions, as_it_is, reductions
 from vegtool.meshes.pieces import Surface, pieces
 from vegtool.progress import Progress, silent
@@ -76,10 +77,16 @@ class Descent:
     """A hybrid on its way down: which faces are in the mesh, and in which parts of it."""
 
     def __init__(
-        self, cloud: Cloud, welded: Surface, extents: FloatArray, weights: Weights
+        self,
+        cloud: Cloud,
+        welded: Surface,
+        extents: FloatArray,
+        weights: Weights,
+        known: dict[bytes, Reductions] | None = None,
     ) -> None:
         """welded: all faces, (f, 3), by places that they share. extents: (q, 4) radii, least and
-        greatest along the two sides of the billboard, of each pair's face."""
+        greatest along the two sides of the billboard, of each pair's face. known: reductions that
+        were made before, to which others are added."""
         self.cloud, self.welded, self.extents, self.weights = cloud, welded, extents, weights
         count = len(cloud.plant.faces)
         self.total = float(welded.areas.sum()) or 1.0
@@ -88,7 +95,7 @@ class Descent:
         self.parts: dict[int, Part] = {}
         self.place_part = np.full(len(welded.positions), -1, dtype=np.int64)
         self._next = 0
-        self._known: dict[bytes, Reductions] = {}
+        self.known = {} if known is None else known
         ends = np.searchsorted(cloud.plane, np.arange(len(cloud.normal) + 1))
         self.pairs = [np.arange(a, b) for a, b in pairwise(ends)]
         by_face = np.argsort(cloud.face, kind="stable")
@@ -102,6 +109,16 @@ class Descent:
         on_cloud = np.zeros(count, dtype=bool)
         on_cloud[cloud.face] = True
         self.terms = sum(self.board, Terms(float(self.wrong[on_cloud].sum())))
+
+    def again(self, weights: Weights) -> Descent:
+        """From the start, with other weights; what is known stays so."""
+        return Descent(self.cloud, self.welded, self.extents, weights, self.known)
+
+    @property
+    def triangles(self) -> int:
+        """Of billboards and mesh."""
+        boards = sum(1 for pairs in self.pairs if len(pairs))
+        return PER_BILLBOARD * boards + sum(len(p.surface.faces) for p in self.parts.values())
 
     @property
     def in_mesh(self) -> np.ndarray:
@@ -207,14 +224,14 @@ class Descent:
     def reduced(self, faces: Labels) -> Reductions:
         """The reductions of connected faces, each made once."""
         key = faces.tobytes()
-        if key not in self._known:
+        if key not in self.known:
             surface = Surface(
                 self.welded.positions, self.welded.faces[faces], self.welded.corners[faces]
             )
             many = self.whole(faces)
             found = reductions(surface, self.cloud.reach) if many else as_it_is(surface)
-            self._known[key] = found
-        return self._known[key]
+            self.known[key] = found
+        return self.known[key]
 
     def accept(self, made: Proposal) -> None:
         """Take a step."""
@@ -284,5 +301,5 @@ def _costliest(start: Descent, began: float) -> Iterator[Step]:
 
 def _step(now: Descent, began: float) -> Step:
     boards = sum(1 for pairs in now.pairs if len(pairs))
-    triangles = PER_BILLBOARD * boards + sum(len(p.surface.faces) for p in now.parts.values())
-    return Step(boards, triangles, now.terms, now.terms.cost(now.weights), perf_counter() - began)
+    seconds = perf_counter() - began
+    return Step(boards, now.triangles, now.terms, now.terms.cost(now.weights), seconds)
