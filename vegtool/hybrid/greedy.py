@@ -31,10 +31,12 @@ from vegtool.clustering.features import Labels
 from vegtool.hybrid.cloud import Cloud
 from vegtool.hybrid.cost import PER_BILLBOARD, Terms
 from vegtool.hybrid.options import Weights
-from vegtool.hybrid.reduction import FEWEST, Reductions, as_it_is, reductions
+from vegtool.hybrid.reduction import Reductions, reductions
 from vegtool.meshes.pieces import Surface, pieces
 from vegtool.progress import Progress, silent
 
+SMALL = 24
+"""Faces: what is connected to fewer is no body of its own, but one with all others like it."""
 LEAST = 1e-12
 """Of the cost: a step that saves less is none."""
 
@@ -104,8 +106,8 @@ class Descent:
         self.board = [self.billboard(pairs) for pairs in self.pairs]
         cut_out = np.array([m.alpha_mode == "mask" for m in cloud.plant.materials])
         self.solid = ~cut_out[cloud.plant.face_material]
-        solid = np.flatnonzero(self.solid)
-        self.bodies = [own for own in self.connected(solid) if self.whole(own)]
+        self.uses = np.bincount(welded.faces.ravel(), minlength=len(welded.positions))
+        self.bodies = self.connected(np.flatnonzero(self.solid))
         on_cloud = np.zeros(count, dtype=bool)
         on_cloud[cloud.face] = True
         self.terms = sum(self.board, Terms(float(self.wrong[on_cloud].sum())))
@@ -196,22 +198,18 @@ class Descent:
             yield int(plane), pairs[~gone[self.cloud.face[pairs]]]
 
     def connected(self, faces: Labels) -> list[Labels]:
-        """Faces, in parts that share places; those of FEWEST faces and fewer as one part."""
+        """Faces, (n,) in order, in parts that share places; all that are SMALL as one part."""
         if not len(faces):
             return []
         count, piece = pieces(self.welded.faces[faces])
         size = np.bincount(piece, minlength=count)
-        group = np.where(size[piece] <= FEWEST, -1, piece)
+        group = np.where(size[piece] < SMALL, -1, piece)
         order = np.argsort(group, kind="stable")
         ends = np.flatnonzero(np.diff(group[order], prepend=-2))
         return np.split(faces[order], ends[1:])
 
-    def whole(self, faces: Labels) -> bool:
-        """Whether it is one connected part, of more than FEWEST faces."""
-        return len(faces) > FEWEST and pieces(self.welded.faces[faces])[0] == 1
-
     def part(self, faces: Labels) -> Part:
-        """Connected faces, with as many triangles as cost least."""
+        """A part of the mesh, with as many triangles as cost least."""
         found = self.reduced(faces)
         area, count = found.area / self.total, len(self.part_of)
         terms = [
@@ -222,16 +220,20 @@ class Descent:
         return Part(faces, found.surfaces[best], found.became[best], terms[best])
 
     def reduced(self, faces: Labels) -> Reductions:
-        """The reductions of connected faces, each made once."""
+        """The reductions of a part, each made once. Where all that shares its places is in it,
+        its borders are the model's own, and may move."""
         key = faces.tobytes()
         if key not in self.known:
-            surface = Surface(
-                self.welded.positions, self.welded.faces[faces], self.welded.corners[faces]
-            )
-            many = self.whole(faces)
-            found = reductions(surface, self.cloud.reach) if many else as_it_is(surface)
-            self.known[key] = found
+            surface = self.surface(faces)
+            places, uses = np.unique(surface.faces, return_counts=True)
+            complete = bool((self.uses[places] == uses).all())
+            self.known[key] = reductions(surface, self.cloud.reach, borders=not complete)
         return self.known[key]
+
+    def surface(self, faces: Labels) -> Surface:
+        """Some faces as they are."""
+        own = self.welded
+        return Surface(own.positions, own.faces[faces], own.corners[faces])
 
     def accept(self, made: Proposal) -> None:
         """Take a step."""

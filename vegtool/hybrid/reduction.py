@@ -1,6 +1,6 @@
-"""A connected part of the mesh, with fewer and fewer triangles, and how wrong each is.
+"""A part of the mesh with fewer and fewer triangles, and how wrong each is.
 
-Edges are collapsed by their quadric error, open borders stay (meshes/collapse.py): what is beyond
+Edges are collapsed by their quadric error (meshes/collapse.py). Borders stay where what is beyond
 them is drawn by others. A vertex is as far off as the triangles about what it has become are from
 its place.
 """
@@ -45,12 +45,13 @@ class Reductions:
         return np.array([one.areas.sum() for one in self.surfaces])
 
 
-def reductions(surface: Surface, reach: float) -> Reductions:
-    """Of a connected surface, down to FEWEST triangles or where no edge may go."""
+def reductions(surface: Surface, reach: float, borders: bool) -> Reductions:
+    """Of a surface, down to FEWEST triangles or where no edge may go. borders: whether open ones
+    stay."""
     surfaces, became, wrong = [surface], [surface.faces], [0.0]
     target = len(surface.faces) / RATIO
     while target >= FEWEST:
-        made = edges_collapsed(surface, int(target), AGGRESSIVE, borders=True)
+        made = edges_collapsed(surface, int(target), AGGRESSIVE, borders)
         if not 0 < len(made.faces) < len(surfaces[-1].faces):
             break
         surfaces.append(carried(surface, made))
@@ -58,11 +59,6 @@ def reductions(surface: Surface, reach: float) -> Reductions:
         wrong.append(displaced(surface, made, reach))
         target = min(target, len(made.faces)) / RATIO
     return Reductions(tuple(surfaces), tuple(became), np.array(wrong))
-
-
-def as_it_is(surface: Surface) -> Reductions:
-    """Of a surface that is not reduced."""
-    return Reductions((surface,), (surface.faces,), np.zeros(1))
 
 
 def displaced(surface: Surface, made: Collapsed, reach: float) -> float:

@@ -66,9 +66,10 @@ def pieces(faces: npt.NDArray[np.integer]) -> tuple[int, IntArray]:
     """How many connected pieces the triangles (n, 3) form, and (n,) int32 the piece of each."""
     if not len(faces):
         return 0, np.empty(0, np.int32)
-    vertices = int(faces.max()) + 1
-    start, end = np.concatenate([faces[:, :2], faces[:, 1:]]).T
+    used, own = np.unique(faces, return_inverse=True)
+    own, vertices = own.reshape(-1, 3), len(used)
+    start, end = np.concatenate([own[:, :2], own[:, 1:]]).T
     joined = coo_matrix((np.ones(len(start), bool), (start, end)), shape=(vertices, vertices))
     _, label = connected_components(joined, directed=False)
-    present, piece = np.unique(label[faces[:, 0]], return_inverse=True)
+    present, piece = np.unique(label[own[:, 0]], return_inverse=True)
     return len(present), piece.astype(np.int32)
