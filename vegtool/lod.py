@@ -97,6 +97,7 @@ class Atlas:
     back equals front where one picture serves both sides.
     white: (4,) int32 texels, as front: a block of opaque white with a flat normal, for a mesh in
     the same draw call to show all over; or None.
+    charts: (c, 4) int32 texels, as front: opaque pictures for that mesh (`Charts`); or None.
     light: (h, w, 4) uint8, linear, what `Material.light_texture` holds: how much of the sky's light
     reaches the side that the picture shows (red) and the other side (green), and how much light
     passes through (alpha), in the colour times transmission_tint, (3,); blue is 0. Or None where
@@ -109,6 +110,7 @@ class Atlas:
     front: IntArray
     back: IntArray
     white: IntArray | None = None
+    charts: IntArray | None = None
     light: ByteArray | None = None
     transmission_tint: FloatArray = field(default_factory=lambda: np.ones(3))
 
@@ -128,6 +130,8 @@ class Atlas:
             values["normal"] = checked("Atlas.normal", self.normal, (height, width, 3), np.uint8)
         if self.white is not None:
             values["white"] = checked("Atlas.white", self.white, (4,), np.int32)
+        if self.charts is not None:
+            values["charts"] = checked("Atlas.charts", self.charts, (None, 4), np.int32)
         if self.light is not None:
             values["light"] = checked("Atlas.light", self.light, (height, width, 4), np.uint8)
         for name, value in values.items():
@@ -142,6 +146,23 @@ class Atlas:
     def images(self) -> int:
         """How many images a client loads: colour, and normals and light where there are any."""
         return 1 + (self.normal is not None) + (self.light is not None)
+
+
+@dataclass(frozen=True, eq=False)
+class Charts:
+    """What a level's mesh shows of its atlas, where that is more than white.
+
+    planes: (c,) of which each picture is, seen from the front: a point of the mesh shows what lies
+    beneath it on the plane of its face. of_face: (t,) int32 the plane of each of the mesh's faces,
+    -1 for those that are white and coloured by their vertices. No vertex is of two.
+    """
+
+    planes: Billboards
+    of_face: IntArray
+
+    def __post_init__(self) -> None:
+        of_face = checked("Charts.of_face", self.of_face, (None,), np.int32)
+        object.__setattr__(self, "of_face", of_face)
 
 
 @dataclass(frozen=True)
@@ -176,8 +197,9 @@ class Measured:
 class Level:
     """One level of detail: a mesh (a Plant), billboards with their atlas, or both.
 
-    kind: a hybrid level is billboards and an opaque mesh without textures, coloured by its
-    vertices, which are drawn as one (`level_triangles`): its atlas has a white block.
+    kind: a hybrid level is billboards, of which there may be none, and an opaque mesh without
+    textures of its own, coloured by its vertices or by the atlas (`charts`), which are drawn as one
+    (`level_triangles`): the atlas has a white block.
     double_sided: one quad per billboard, drawn from both sides with one picture (the client flips
     the normal on the back). Else two opposite single-sided quads, each with its own picture; a
     hybrid's mesh then has its double-sided faces twice.
@@ -199,6 +221,7 @@ class Level:
     measured: Measured | None = None
     unlit: bool = False
     seconds: dict[str, float] = field(default_factory=dict)
+    charts: Charts | None = None
 
     def __post_init__(self) -> None:
         if self.kind == "mesh" and self.mesh is None:
@@ -216,6 +239,12 @@ class Level:
             raise ValueError("Level: a hybrid level needs a mesh with colours")
         if self.atlas is None or self.atlas.white is None:
             raise ValueError("Level: a hybrid level needs an atlas with a white block")
+        if self.charts is not None and (
+            self.atlas.charts is None
+            or len(self.atlas.charts) != len(self.charts.planes)
+            or len(self.charts.of_face) != len(self.mesh.faces)
+        ):
+            raise ValueError("Level: charts need a picture each, and to be of the mesh's faces")
         for m in self.mesh.materials:
             if m.color_texture or m.normal_texture or m.alpha_mode != "opaque":
                 raise ValueError(f"Level: material {m.name} of a hybrid must be opaque and plain")
@@ -306,8 +335,9 @@ class Triangles:
 def level_triangles(level: Level) -> Triangles:
     """What a client draws of a level with an atlas, in one call: its quads, then its mesh.
 
-    All vertices of a hybrid's mesh show the middle of the white block: their texture coordinates
-    stand still over every face, so that clients sample it at full size, whatever the distance.
+    Vertices of a hybrid's mesh that are on no chart show the middle of the white block: their
+    texture coordinates stand still over every face, so that clients sample it at full size,
+    whatever the distance.
     Their normals are the vertices' own (the block's normal is flat), so that any tangent will do.
     """
     quads = billboard_quads(level)
@@ -322,7 +352,8 @@ def level_triangles(level: Level) -> Triangles:
     parts = [replace(quads, colors=np.ones((len(quads.positions), 4)))]
     for index in np.unique(mesh.face_material):
         material = mesh.materials[index]
-        vertices, corners = np.unique(mesh.faces[mesh.face_material == index], return_inverse=True)
+        own = mesh.face_material == index
+        vertices, corners = np.unique(mesh.faces[own], return_inverse=True)
         count = len(vertices)
         colors = np.clip(mesh.colors[vertices] * material.base_color, 0.0, 1.0)
         colors[:, 3] = 1.0
@@ -335,10 +366,36 @@ def level_triangles(level: Level) -> Triangles:
             corners.ravel().astype(np.int32),
             colors,
         )
+        if level.charts is not None:
+            chart = np.empty(count, dtype=np.int32)
+            chart[corners.reshape(-1, 3)] = level.charts.of_face[own][:, None]
+            front = _pictured(front, chart, level.charts.planes, atlas)
         parts.append(front)
         if material.double_sided and not level.double_sided:
-            parts.append(replace(front, normals=-normals, indices=front.indices[::-1]))
+            back = replace(front, normals=-front.normals, indices=front.indices[::-1])
+            if level.charts is not None:  # pictures are mirrored, as those of billboards are
+                back = replace(back, tangents=back.tangents * [1, 1, 1, -1])
+            parts.append(back)
     return _joined(parts)
+
+
+def _pictured(drawn: Triangles, chart: IntArray, planes: Billboards, atlas: Atlas) -> Triangles:
+    """The same with pictures: chart (v,), -1 for none. Normals and tangents are the planes'."""
+    assert atlas.charts is not None
+    shown = np.flatnonzero(chart >= 0)
+    plane = chart[shown]
+    height, width = atlas.color.shape[:2]
+    offset = drawn.positions[shown] - planes.center[plane]
+    half = np.maximum(planes.half_size[plane], np.finfo(float).tiny)
+    across = np.einsum("vi,vi->v", offset, planes.u[plane]) / half[:, 0]
+    up = np.einsum("vi,vi->v", offset, planes.v[plane]) / half[:, 1]
+    x0, y0, w, h = atlas.charts[plane].astype(np.float64).T
+    uvs, normals, tangents = drawn.uvs.copy(), drawn.normals.copy(), drawn.tangents.copy()
+    uvs[shown, 0] = (x0 + w * (np.clip(across, -1, 1) + 1) / 2) / width
+    uvs[shown, 1] = (y0 + h * (1 - np.clip(up, -1, 1)) / 2) / height
+    normals[shown] = planes.normal[plane]
+    tangents[shown, :3], tangents[shown, 3] = planes.u[plane], 1.0
+    return replace(drawn, uvs=uvs, normals=normals, tangents=tangents)
 
 
 def _perpendicular(normals: FloatArray) -> FloatArray:

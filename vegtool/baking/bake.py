@@ -7,7 +7,7 @@ the alpha test (coverage.py).
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import sqrt
 
 import numpy as np
@@ -17,7 +17,7 @@ from vegtool.baking.coverage import coverage_kept
 from vegtool.baking.dilate import nearest_covered
 from vegtool.baking.options import BakeOptions
 from vegtool.baking.pack import Packing, pack
-from vegtool.baking.sides import compare_sides, opposite_needed, pictures_of, turned
+from vegtool.baking.sides import compare_sides, joined, opposite_needed, pictures_of, turned
 from vegtool.errors import UsageError
 from vegtool.gl.context import describe
 from vegtool.gl.pictures import BakedLight, Drawn, draw_pictures
@@ -50,13 +50,15 @@ def bake(
     progress: Progress = silent,
     white: bool = False,
     lit: BakedLight | None = None,
+    charts: Charted | None = None,
 ) -> Level:
     """Bake the faces of each cluster into the pictures of the billboards that show it.
 
     plant: give PlantBuffers to bake several levels from one upload. labels: (f,) int32 cluster of
     each face, matching `billboards.cluster`; faces of clusters that no billboard shows, and those
     of cluster -1, are left out. white: give the atlas a white block, for a mesh beside the
-    billboards (Atlas.white). lit: light that goes into the colours, in place of normals; without,
+    billboards (Atlas.white). charts: more pictures, for that mesh. lit: light that goes into the
+    colours, in place of normals; without,
     the atlas has the plant's exposure and the light that its leaves let through, where it knows of
     them (Atlas.light). The level's billboards are those given, some turned round (u and the
     normal), so that the side which shows more is in front; its density is lower than asked for
@@ -68,7 +70,7 @@ def bake(
     if isinstance(plant, Plant):
         with PlantBuffers(plant) as buffers:
             return bake(
-                buffers, labels, billboards, texels_per_metre, options, progress, white, lit
+                buffers, labels, billboards, texels_per_metre, options, progress, white, lit, charts
             )
     seconds: dict[str, float] = {}
     progress("bake", 0.0)
@@ -86,6 +88,9 @@ def bake(
     with timed(seconds, "pack"):
         half_size = np.concatenate([billboards.half_size, billboards.half_size[behind]])
         half_size[len(billboards) :][sides.back[behind] == 0] = 0  # nothing there: one texel
+        quads = len(half_size)
+        if charts is not None:
+            half_size = np.concatenate([half_size, charts.planes.half_size])
         limit = min(options.max_texture, describe(plant.ctx).max_texture)
         blocks = int(white)
         packing, density = fit(half_size, texels_per_metre, options.gutter, limit, blocks)
@@ -94,11 +99,20 @@ def bake(
     which = np.concatenate([np.arange(len(billboards)), behind])
     side = np.where(np.arange(len(which)) < len(billboards), 1, -1)
     back_face, back_picture = _pairs_behind(face, shown_by, behind, len(billboards))
+    pictures = pictures_of(billboards, which, side, packing.rect[:quads])
+    faces, shows = [face, back_face], [shown_by, back_picture]
+    if charts is not None:
+        count = len(charts.planes)
+        nth, ones = np.arange(count, dtype=np.int32), np.ones(count, dtype=np.int32)
+        own = pictures_of(charts.planes, nth, ones, packing.rect[quads : quads + count])
+        pictures = joined(pictures, own)
+        faces.append(charts.face)
+        shows.append(charts.chart + quads)
     drawn = draw_pictures(
         plant,
-        pictures_of(billboards, which, side, packing.rect[: len(which)]),
-        np.concatenate([face, back_face]),
-        np.concatenate([shown_by, back_picture]),
+        pictures,
+        np.concatenate(faces).astype(np.int32),
+        np.concatenate(shows).astype(np.int32),
         (packing.width, packing.height),
         samples,
         None if lit is None else replace(lit, both_sides=double_sided),
@@ -115,7 +129,13 @@ def bake(
         if block is not None:
             whiten(color, normal, light, block, options.gutter, _exposure(plant.plant, labels < 0))
         tint = transmission_tint(plant.plant)
-        atlas = Atlas(color, normal, drawn.depth, front, back, block, light, tint)
+        shown = None
+        if charts is not None:
+            shown = packing.rect[quads : quads + len(charts.planes)]
+            gutter = options.gutter
+            for x, y, w, h in shown.tolist():
+                color[y - gutter : y + h + gutter, x - gutter : x + w + gutter, 3] = 255
+        atlas = Atlas(color, normal, drawn.depth, front, back, block, shown, light, tint)
     progress("bake", 1.0)
     return Level(
         "billboards",
@@ -128,9 +148,19 @@ def bake(
     )
 
 
+@dataclass(frozen=True, eq=False)
+class Charted:
+    """Pictures for a mesh: planes (c,); and (m,), (m,) int32 faces, and the picture that shows
+    each."""
+
+    planes: Billboards
+    face: IntArray
+    chart: IntArray
+
+
 def pairs(labels: IntArray, cluster: IntArray) -> tuple[IntArray, IntArray]:
     """(m,), (m,) int32: every face with every billboard that shows its cluster."""
-    count = max(int(labels.max(initial=-1)), int(cluster.max(initial=-1))) + 1
+    count = max(int(labels.max(initial=0)), int(cluster.max(initial=0))) + 1
     order = np.argsort(cluster, kind="stable").astype(np.int32)
     shown = np.bincount(cluster, minlength=count)
     first = np.cumsum(shown) - shown

@@ -7,7 +7,7 @@ missing from one side, or where leaves have an underside of another colour.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -72,6 +72,9 @@ def compare_sides(
     as one picture shows the mean of both.
     """
     count = len(billboards)
+    if not count:
+        nothing = np.zeros(0)
+        return Sides(nothing, nothing, nothing, nothing, np.zeros(0, dtype=bool))
     cell = np.arange(2 * count)
     corner = np.stack([cell % CELLS_PER_ROW, cell // CELLS_PER_ROW], axis=1) * CELL
     rect = np.concatenate([corner, np.full_like(corner, CELL)], axis=1)
@@ -147,4 +150,14 @@ def pictures_of(
         billboards.half_depth[which],
         side,
         rect,
+    )
+
+
+def joined(some: Pictures, others: Pictures) -> Pictures:
+    """Some pictures, then others."""
+    return Pictures(
+        *(
+            np.concatenate([getattr(some, item.name), getattr(others, item.name)])
+            for item in fields(Pictures)
+        )
     )

@@ -37,10 +37,15 @@ class Cloud:
     @cached_property
     def shown(self) -> Plant:
         """The plant with a face for each pair, as baking wants it: a label for each is `plane`."""
+        return self.shown_and(self.face[:0])
+
+    def shown_and(self, others: IntArray) -> Plant:
+        """The same, and then some other faces of the plant."""
+        face = np.concatenate([self.face, others])
         return replace(
             self.plant,
-            faces=self.plant.faces[self.face],
-            face_material=self.plant.face_material[self.face],
+            faces=self.plant.faces[face],
+            face_material=self.plant.face_material[face],
             branches=None,
         )
 

@@ -220,14 +220,17 @@ class Descent:
         return Part(faces, found.surfaces[best], found.became[best], terms[best])
 
     def reduced(self, faces: Labels) -> Reductions:
-        """The reductions of a part, each made once. Where all that shares its places is in it,
-        its borders are the model's own, and may move."""
+        """The reductions of a part, each made once. Borders stay, or else a trunk would be without
+        its foot; those of what is SMALL may move where nothing else shares them, since many a leaf
+        is all border."""
         key = faces.tobytes()
         if key not in self.known:
             surface = self.surface(faces)
             places, uses = np.unique(surface.faces, return_counts=True)
             complete = bool((self.uses[places] == uses).all())
-            self.known[key] = reductions(surface, self.cloud.reach, borders=not complete)
+            small = bool(np.bincount(pieces(surface.faces)[1]).max() < SMALL)
+            borders = not (small and complete)
+            self.known[key] = reductions(surface, self.cloud.reach, borders)
         return self.known[key]
 
     def surface(self, faces: Labels) -> Surface:

@@ -6,21 +6,24 @@ from dataclasses import replace
 
 import numpy as np
 
-from vegtool.baking.bake import PlantBuffers, bake
+from vegtool.baking.bake import Charted, PlantBuffers, bake
 from vegtool.baking.options import BakeOptions
 from vegtool.boxes import geometric_error
 from vegtool.hybrid.budget import within
+from vegtool.hybrid.charts import charted
 from vegtool.hybrid.cloud import Cloud, cloud_of
 from vegtool.hybrid.cost import PER_BILLBOARD
 from vegtool.hybrid.greedy import Descent, descent
 from vegtool.hybrid.mesh import colored
 from vegtool.hybrid.options import Budget, Weights
-from vegtool.lod import Level
+from vegtool.lod import Charts, Level
 from vegtool.meshes.pieces import all_welded
+from vegtool.plant import Plant
 from vegtool.progress import Progress, silent
+from vegtool.refine.color import unbiased_color
 from vegtool.refine.level import Source, Wanted, as_measured
 from vegtool.refine.mesh import joined
-from vegtool.refine.planes import billboards_about
+from vegtool.refine.planes import billboards_about, none
 from vegtool.timing import timed
 
 STARTS_WITH = 0.5
@@ -70,31 +73,65 @@ def drawn_as(source: Source, wanted: Wanted, found: Descent, progress: Progress 
     plant, cloud = source.plant, found.cloud
     density = source.truth_at.display.pixels_per_metre(wanted.near_m)
     with timed(seconds, "mesh"):
-        own = colored(source.colored, found.parts.values())
-        materials = np.unique(plant.face_material[found.in_mesh])
-        both_sides = any(plant.materials[index].double_sided for index in materials)
-        scattering = replace(source.scattering[0], double_sided=both_sides)
-        mesh = joined([own], plant.name, [scattering])
+        mesh, charts, pictures = mesh_of(source, found, density)
     left = np.sort(np.concatenate(found.pairs))
     labels = np.full(len(plant.faces), -1, dtype=np.int32)
-    if len(left):
-        with timed(seconds, "planes"):
-            rest = cloud.of(left)
-            labels[rest.face] = rest.plane
-            billboards = billboards_about(rest.shown, rest.plane, rest.normal)
-        options = BakeOptions(max_texture=wanted.max_texture, fit_alpha=False)
-        progress("bake", 0.1)
-        with PlantBuffers(rest.shown) as buffers:
-            white = mesh is not None
-            level = bake(
-                buffers, rest.plane, billboards, density, options, white=white, lit=source.lit
-            )
+    rest = cloud.of(left)
+    labels[rest.face] = rest.plane
+    if len(left) or pictures is not None:
+        level = baked(source, wanted, rest, density, mesh is not None, pictures, progress)
         seconds |= level.seconds
         if mesh is not None:
-            level = replace(level, kind="hybrid", mesh=mesh)
+            level = replace(level, kind="hybrid", mesh=mesh, charts=charts)
+        if mesh is not None and not len(left):
+            level = replace(level, double_sided=any(m.double_sided for m in mesh.materials))
         level = as_measured(source, wanted, level, seconds, progress)
     else:
         level = Level("mesh", mesh=mesh, unlit=source.lit is not None)
+        level = unbiased_color(level, source.truth_at(wanted.near_m))
     with timed(seconds, "error"):
         error = geometric_error(plant, labels, level.billboards, level.mesh, found.in_mesh)
     return replace(level, near_distance_m=wanted.near_m, geometric_error_m=error, seconds=seconds)
+
+
+def mesh_of(
+    source: Source, found: Descent, density: float
+) -> tuple[Plant | None, Charts | None, Charted | None]:
+    """The mesh, what its faces show, and what is to be baked for that."""
+    mesh, charts, pictures = colored(source.colored, found.parts.values()), None, None
+    if mesh is None:
+        return None, None, None
+    plant = source.plant
+    apart = charted(plant, mesh, density, found.cloud.reach * plant.radius)
+    if apart is not None:
+        mesh, charts, pictures = apart
+    materials = np.unique(plant.face_material[found.in_mesh])
+    both_sides = any(plant.materials[index].double_sided for index in materials)
+    scattering = replace(source.scattering[0], double_sided=both_sides)
+    return joined([mesh], plant.name, [scattering]), charts, pictures
+
+
+def baked(
+    source: Source,
+    wanted: Wanted,
+    rest: Cloud,
+    density: float,
+    white: bool,
+    pictures: Charted | None,
+    progress: Progress,
+) -> Level:
+    """Billboards, and the pictures of a mesh."""
+    shown = rest.shown_and(np.empty(0, np.int32) if pictures is None else pictures.face)
+    labels = np.full(len(shown.faces), -1, dtype=np.int32)
+    labels[: len(rest.face)] = rest.plane
+    billboards = none()
+    if len(rest.face):
+        billboards = billboards_about(rest.shown, rest.plane, rest.normal)
+    if pictures is not None:
+        nth = len(rest.face) + np.arange(len(pictures.face), dtype=np.int32)
+        pictures = replace(pictures, face=nth)
+    options = BakeOptions(max_texture=wanted.max_texture, fit_alpha=False)
+    with PlantBuffers(shown) as buffers:
+        return bake(
+            buffers, labels, billboards, density, options, progress, white, source.lit, pictures
+        )

@@ -2,7 +2,7 @@
 
 Edges are collapsed by their quadric error (meshes/collapse.py). Borders stay where what is beyond
 them is drawn by others. A vertex is as far off as the triangles about what it has become are from
-its place.
+its place; area that is lost is not shown.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ AGGRESSIVE = 7.0
 @dataclass(frozen=True, eq=False)
 class Reductions:
     """r of a surface of n triangles, the surface as it is first. became: of each, (n, 3) what has
-    become of the corners, -1 for nothing. wrong: (r,) squared radii, as of `displaced`."""
+    become of the corners, -1 for nothing. wrong: (r,) squared radii,
+    what is displaced or not shown."""
 
     surfaces: tuple[Surface, ...]
     became: tuple[IntArray, ...]
@@ -56,7 +57,8 @@ def reductions(surface: Surface, reach: float, borders: bool) -> Reductions:
             break
         surfaces.append(carried(surface, made))
         became.append(made.vertex)
-        wrong.append(displaced(surface, made, reach))
+        lost = max(0.0, float(surface.areas.sum() - surfaces[-1].areas.sum()))
+        wrong.append(displaced(surface, made, reach) + lost)
         target = min(target, len(made.faces)) / RATIO
     return Reductions(tuple(surfaces), tuple(became), np.array(wrong))
 

@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vegtool.arrays import ByteArray, FloatArray, Picture
+from vegtool.arrays import ByteArray, FloatArray, IntArray, Picture
+from vegtool.baking.options import BakeOptions
 from vegtool.lod import Level
 from vegtool.measure.metrics import LUMINANCE
 from vegtool.measure.scores import Truths
@@ -87,12 +88,28 @@ def scaled(level: Level, billboards: float, mesh: float) -> Level:
         if level.atlas.white is not None:
             x, y, w, h = level.atlas.white.tolist()
             color[y : y + h, x : x + w] = 255
+        if level.atlas.charts is not None:
+            of_mesh = factor_table(mesh)
+            for x, y, w, h in grown(level.atlas.charts, color.shape).tolist():
+                there = np.s_[y : y + h, x : x + w, :3]
+                color[there] = of_mesh[level.atlas.color[there]]
         level = replace(level, atlas=replace(level.atlas, color=color))
     if level.mesh is not None and level.mesh.colors is not None:
         colors = level.mesh.colors.copy()
-        colors[:, :3] = np.clip(colors[:, :3] * mesh, 0.0, 1.0)
+        own = np.ones(len(colors), dtype=bool)  # those of charts are white
+        if level.charts is not None:
+            own[level.mesh.faces[level.charts.of_face >= 0]] = False
+        colors[own, :3] = np.clip(colors[own, :3] * mesh, 0.0, 1.0)
         level = replace(level, mesh=replace(level.mesh, colors=colors))
     return level
+
+
+def grown(rects: IntArray, shape: tuple[int, ...]) -> IntArray:
+    """Rectangles (n, 4) with their gutters, within a picture."""
+    gutter = BakeOptions().gutter
+    low = np.maximum(rects[:, :2] - gutter, 0)
+    high = np.minimum(rects[:, :2] + rects[:, 2:] + gutter, [shape[1], shape[0]])
+    return np.concatenate([low, high - low], axis=1)
 
 
 def factor_table(factor: float) -> ByteArray:

@@ -214,10 +214,11 @@ def as_measured(
     source: Source, wanted: Wanted, level: Level, seconds: dict[str, float], progress: Progress
 ) -> Level:
     """A level whose alpha is mean coverage, with coverage and colour as the plant's."""
-    progress("coverage", 0.6)
-    with timed(seconds, "coverage"):
-        truths = [source.truth_at(metres) for metres in (wanted.near_m, wanted.far_m)]
-        level = solve_coverage(level, truths, BakeOptions().gutter, reach=REACH).level
+    if level.billboards is not None and len(level.billboards):
+        progress("coverage", 0.6)
+        with timed(seconds, "coverage"):
+            truths = [source.truth_at(metres) for metres in (wanted.near_m, wanted.far_m)]
+            level = solve_coverage(level, truths, BakeOptions().gutter, reach=REACH).level
     progress("color", 0.7)
     with timed(seconds, "color"):
         return unbiased_color(level, source.truth_at(wanted.near_m))
