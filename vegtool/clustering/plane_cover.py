@@ -129,17 +129,17 @@ def _joined(pieces: Pieces, epsilon: float, reach: float, most: int) -> Cover | 
         return None
     labels = first_valid(pieces, some, reach)
     left = np.flatnonzero(labels < 0)
-    count = len(some.normal)
+    kept = np.unique(labels[labels >= 0])  # of a plane, all pieces may be valid for earlier ones
+    labels = np.searchsorted(kept, labels)
+    normal, offset = some.normal[kept], some.offset[kept]
     if not len(left):
-        return Cover(labels, some.normal, some.offset)
-    rest = cover(pieces.of(left), epsilon, most - count)
+        return Cover(labels, normal, offset)
+    rest = cover(pieces.of(left), epsilon, most - len(kept))
     if rest is None:
         return None
-    labels[left] = count + rest.labels
+    labels[left] = len(kept) + rest.labels
     return Cover(
-        labels,
-        np.concatenate([some.normal, rest.normal]),
-        np.concatenate([some.offset, rest.offset]),
+        labels, np.concatenate([normal, rest.normal]), np.concatenate([offset, rest.offset])
     )
 
 
@@ -168,11 +168,11 @@ class Grid:
         self._count = int(min(np.ceil(length / (CELL * reach)), MOST_OFFSETS))
         self.cell = length / self._count
         self.left = np.ones(len(pieces), dtype=bool)
-        self._density = self._of(np.arange(len(pieces)))
+        self.density = self._of(np.arange(len(pieces)))
 
     def densest(self) -> tuple[FloatArray, Labels]:
         """Direction (3,) of the densest cell, and the pieces that planes about it may pass."""
-        nth, cell = np.unravel_index(int(self._density.argmax()), self._density.shape)
+        nth, cell = np.unravel_index(int(self.density.argmax()), self.density.shape)
         offset = self._start + (float(cell) + 0.5) * self.cell
         about = 2 * self.reach + self.cell
         near = (self.low[nth] - about <= offset) & (offset <= self.high[nth] + about)
@@ -180,7 +180,7 @@ class Grid:
 
     def take(self, rows: Labels) -> None:
         """Pieces off."""
-        self._density -= self._of(rows)
+        self.density -= self._of(rows)
         self.left[rows] = False
 
     def _of(self, rows: Labels) -> FloatArray:
@@ -235,15 +235,26 @@ def densest_plane(grid: Grid) -> tuple[Labels, FloatArray, float]:
 
 
 def alone(grid: Grid) -> tuple[Labels, FloatArray, float]:
-    """The largest piece that is left, on a plane of its own."""
+    """The plane of the largest piece that is left: that piece, and all that are valid for it."""
     left = np.flatnonzero(grid.left)
     facing = np.add.reduceat(grid.pieces.area, grid.pieces.first, axis=0)[left]
     largest = int((facing**2).sum(axis=1).argmax())
     normal = unit(facing[largest])
-    normal = normal if normal.any() else np.array([0.0, 0.0, 1.0])
-    rows = left[largest : largest + 1]
-    low, high = grid.pieces.of(rows).spans(normal[None])
-    return rows, normal, float(low[0, 0] + high[0, 0]) / 2
+    if not normal.any():
+        normal = across(grid.pieces.of(left[largest : largest + 1]).corners[:, 0])
+    low, high = (of[0] for of in grid.pieces.of(left).spans(normal[None]))
+    offset = float(low[largest] + high[largest]) / 2
+    valid = (high - grid.reach <= offset) & (offset <= low + grid.reach)
+    valid[largest] = True
+    return left[valid], normal, offset
+
+
+def across(corners: FloatArray) -> FloatArray:
+    """(3,) a unit vector across the longest edge of a triangle (3, 3) that has no normal."""
+    edges = np.roll(corners, -1, axis=0) - corners
+    edge = edges[np.linalg.norm(edges, axis=1).argmax()]
+    normal = unit(np.cross(edge, np.eye(3)[np.abs(edge).argmin()]))
+    return normal if normal.any() else np.array([0.0, 0.0, 1.0])
 
 
 def densest_offsets(

@@ -12,10 +12,10 @@ from __future__ import annotations
 import numpy as np
 
 from vegtool.arrays import IntArray, unit
-from vegtool.clustering import ClusterOptions
-from vegtool.clustering.features import Labels, face_weights, own_corners, samples
+from vegtool.clustering import ClusterOptions, compact
+from vegtool.clustering.features import Labels, face_weights, own_corners, samples, spread_to
 from vegtool.clustering.partition import compacted, split
-from vegtool.clustering.plane_cover import GRID, Cover, Pieces, cover
+from vegtool.clustering.plane_cover import GRID, ROUNDING, Cover, Pieces, cover
 from vegtool.plant import Plant
 from vegtool.progress import Progress, silent
 
@@ -41,17 +41,27 @@ def planes(
 ) -> IntArray:
     """(f,) int32 labels of at most `count` clusters, each near one plane. Nothing is random."""
     points = samples(plant, options.orientation_scale(count), count)
-    pieces, _ = pieces_of(plant, points.of_face)
-    labels = compacted(planes_for(pieces, count, progress).labels)
+    piece = by_first_face(points.of_face)
+    pieces, _ = pieces_of(plant, piece)
+    found = planes_for(pieces, count, progress)
+    labels = compacted(spread_to(points.of_face, found.labels[piece]))
     labels = split(points.points, points.weights, labels, min(count, len(points.points)))
     return np.asarray(labels[points.of_face], dtype=np.int32)
+
+
+def by_first_face(of_face: Labels) -> Labels:
+    """(f,) the same pieces, in the order of their first faces: that of points hangs on rounding."""
+    return compact(of_face.astype(np.int32)).astype(np.int64)
 
 
 def pieces_of(plant: Plant, of_face: Labels) -> tuple[Pieces, np.ndarray]:
     """The faces of each piece as one, in the plant's own frame, and the axes (3, 3) of that."""
     corners, axes = own_corners(plant)
-    edges = corners[:, 1:] - corners[:, :1]
-    normal = unit(np.cross(edges[:, 0], edges[:, 1]))
+    edges = np.roll(corners, -1, axis=1) - corners
+    across = np.cross(edges[:, 0], edges[:, 1])
+    longest = np.linalg.norm(edges, axis=2).max(axis=1)
+    flat = np.linalg.norm(across, axis=1) > ROUNDING * longest  # else its normal is rounding
+    normal = unit(np.where(flat[:, None], across, 0.0))
     order = np.argsort(of_face, kind="stable")
     first = np.flatnonzero(np.diff(of_face[order], prepend=-1))
     weight = face_weights(plant)[order]

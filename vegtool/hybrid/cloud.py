@@ -13,7 +13,7 @@ import numpy as np
 
 from vegtool.arrays import FloatArray, IntArray, unit
 from vegtool.clustering.features import samples
-from vegtool.clustering.plane_space import pieces_of, planes_for
+from vegtool.clustering.plane_space import by_first_face, pieces_of, planes_for
 from vegtool.hybrid.cost import misplaced
 from vegtool.hybrid.shown import pictured, shown_fraction
 from vegtool.plant import Plant
@@ -73,7 +73,7 @@ class Cloud:
 def cloud_of(plant: Plant, count: int, progress: Progress = silent) -> Cloud:
     """At most `count` planes that together pass all faces, by about the least distance that allows
     it."""
-    of_face = samples(plant, 0.0, 1).of_face
+    of_face = by_first_face(samples(plant, 0.0, 1).of_face)
     pieces, axes = pieces_of(plant, of_face)
     found = planes_for(pieces, count, progress)
     label = found.labels[of_face]
