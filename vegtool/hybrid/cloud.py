@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from vegtool.arrays import FloatArray, IntArray, unit
-from vegtool.clustering.features import samples
+from vegtool.clustering.features import own_corners, samples
 from vegtool.clustering.plane_space import by_first_face, pieces_of, planes_for
 from vegtool.hybrid.cost import misplaced
 from vegtool.hybrid.shown import pictured, shown_fraction
@@ -49,12 +49,14 @@ class Cloud:
         """(f,) 0 to 1 how wrong each face is drawn: displaced, or not shown from all around."""
         plant, count = self.plant, len(self.plant.faces)
         radius = plant.radius or 1.0
-        normals = unit(plant.face_area_vectors / radius**2)
+        _, axes = own_corners(plant)  # a plant that is turned is seen by viewers that turn along
+        normals = unit(plant.face_area_vectors / radius**2) @ axes.T
+        planes = self.normal @ axes.T
         height = self.heights()
         away = np.full(count, np.inf)
         np.minimum.at(away, self.face, np.abs(height).mean(axis=1))
-        pictures = np.zeros((count, pictured(normals[:1], self.normal[:1]).shape[1]))
-        np.add.at(pictures, self.face, pictured(normals[self.face], self.normal[self.plane]))
+        pictures = np.zeros((count, pictured(normals[:1], planes[:1]).shape[1]))
+        np.add.at(pictures, self.face, pictured(normals[self.face], planes[self.plane]))
         unshown = 1 - shown_fraction(normals, pictures)
         return np.asarray(np.clip(misplaced(away, self.reach) + unshown, 0.0, 1.0))
 

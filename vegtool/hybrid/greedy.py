@@ -99,9 +99,7 @@ class Descent:
         self.solid = ~cut_out[cloud.plant.face_material]
         solid = np.flatnonzero(self.solid)
         self.bodies = [own for own in self.connected(solid) if self.whole(own)]
-        on_cloud = np.zeros(count, dtype=bool)
-        on_cloud[cloud.face] = True
-        self.terms = sum(self.board, Terms(float(self.wrong[on_cloud].sum())))
+        self.terms = sum(self.board, Terms(float(self.wrong.sum())))
 
     @property
     def in_mesh(self) -> np.ndarray:
