@@ -156,7 +156,7 @@ def test_densities_end_at_exactly_zero() -> None:
 
 
 def test_a_cell_has_what_a_plane_in_it_is_worth() -> None:
-    """A square through the middle, epsilon 0.1: planes along it are valid from -0.1 to 0.1, and none
+    """A square through the middle, epsilon 0.1: planes along it are valid within 0.1, and none
     beyond; the grid's own direction leans by some degrees, and its cells are 0.05 deep."""
     sheet = pieces(SQUARE)
     grid = Grid(sheet, 0.1)

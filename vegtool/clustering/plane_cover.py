@@ -190,7 +190,8 @@ class Grid:
             np.floor((at - self._start) / self.cell).astype(np.int64) for at in (begin, end)
         )
         first, last = np.clip(first, 0, self._count), np.clip(last + 1, 0, self._count)
-        change = np.bincount((row + first).ravel(), worth, row.size * size)
+        change: FloatArray = np.zeros(row.size * size)
+        change += np.bincount((row + first).ravel(), worth, change.size)
         change -= np.bincount((row + last).ravel(), worth, change.size)
         return np.cumsum(change.reshape(-1, size), axis=1)[:, :-1]
 

@@ -13,7 +13,15 @@ import numpy as np
 
 from vegtool.arrays import IntArray, unit
 from vegtool.clustering import ClusterOptions, compact
-from vegtool.clustering.features import Labels, face_weights, own_corners, samples, spread_to
+from vegtool.clustering.features import (
+    SAME,
+    Labels,
+    cells,
+    face_weights,
+    own_corners,
+    samples,
+    spread_to,
+)
 from vegtool.clustering.partition import compacted, split
 from vegtool.clustering.plane_cover import GRID, ROUNDING, Cover, Pieces, cover
 from vegtool.plant import Plant
@@ -55,19 +63,23 @@ def by_first_face(of_face: Labels) -> Labels:
 
 
 def pieces_of(plant: Plant, of_face: Labels) -> tuple[Pieces, np.ndarray]:
-    """The faces of each piece as one, in the plant's own frame, and the axes (3, 3) of that."""
+    """The faces of each piece as one, in the plant's own frame, and the axes (3, 3) of that. Of
+    equal faces of a piece there is one."""
     corners, axes = own_corners(plant)
+    equal = cells(corners.reshape(-1, 9), SAME, of_face)
+    _, kept, equal = np.unique(equal, return_index=True, return_inverse=True)
+    weight = np.bincount(equal, face_weights(plant))
+    order = np.lexsort([kept, of_face[kept]])
+    corners, weight = corners[kept[order]], weight[order]
     edges = np.roll(corners, -1, axis=1) - corners
     across = np.cross(edges[:, 0], edges[:, 1])
     longest = np.linalg.norm(edges, axis=2).max(axis=1)
     flat = np.linalg.norm(across, axis=1) > ROUNDING * longest  # else its normal is rounding
     normal = unit(np.where(flat[:, None], across, 0.0))
-    order = np.argsort(of_face, kind="stable")
-    first = np.flatnonzero(np.diff(of_face[order], prepend=-1))
-    weight = face_weights(plant)[order]
-    area = weight[:, None] * normal[order]
+    first = np.flatnonzero(np.diff(of_face[kept[order]], prepend=-1))
+    area = weight[:, None] * normal
     bare = np.where(area.any(axis=1), 0.0, weight)
-    own = np.ascontiguousarray(corners[order].swapaxes(0, 1))
+    own = np.ascontiguousarray(corners.swapaxes(0, 1))
     return Pieces(own, first, area, bare), axes
 
 
