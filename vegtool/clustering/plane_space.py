@@ -3,8 +3,9 @@
 Décoret, Durand, Sillion, Dorsey: Billboard clouds for extreme model simplification (2003).
 
 How far faces may move onto a plane, epsilon, is about the least with which the planes are no more
-than asked for (`plane_cover.py`): their number is taken to fall with its square. What they fall
-short of the number, the largest clusters are cut in two, which saves empty texels.
+than asked for (`plane_cover.py`): their number is taken to fall with a power of it, which the last
+two tries tell. What they fall short of the number, the largest clusters are cut in two, which saves
+empty texels.
 """
 
 from __future__ import annotations
@@ -34,6 +35,12 @@ FILLED = 0.85
 """Of the number of planes: as many are enough."""
 SOME = 1 << 11
 """Pieces, every nth, among which epsilon is sought first."""
+SPARSE = 1 / 3
+"""Power of how many times as many there are, with which epsilon grows from those to all."""
+FALLS = 2.0
+"""Power of epsilon with which the number of planes falls, as long as no two are known."""
+LEAST_FALLS, MOST_FALLS = 0.5, 4.0
+"""Between which it is believed."""
 TRIES = 8
 """That many epsilons, at most."""
 TOO_MANY = 2
@@ -89,6 +96,7 @@ def planes_for(pieces: Pieces, count: int, progress: Progress = silent) -> Cover
     if len(pieces) > SOME:
         some = pieces.of(np.arange(0, len(pieces), -(-len(pieces) // SOME)))
         _, epsilon = _search(some, count, epsilon, lambda _, f: progress("planes", f / 3))
+        epsilon *= (len(pieces) / len(some)) ** SPARSE
     found, _ = _search(pieces, count, epsilon, lambda _, f: progress("planes", (1 + 2 * f) / 3))
     return found
 
@@ -96,6 +104,7 @@ def planes_for(pieces: Pieces, count: int, progress: Progress = silent) -> Cover
 def _search(pieces: Pieces, count: int, epsilon: float, progress: Progress) -> tuple[Cover, float]:
     """The planes, and their epsilon; what is given is tried first."""
     best, fails, fits = one_plane(pieces), FINEST, ALL
+    falls, known = FALLS, (0.0, 0)
     for nth in range(TRIES):
         if len(best.normal) >= FILLED * count or fits <= BRACKETED * fails:
             break
@@ -106,7 +115,12 @@ def _search(pieces: Pieces, count: int, epsilon: float, progress: Progress) -> t
             best, fits = found, epsilon
         else:
             fails = epsilon
-        epsilon *= (2 * number / ((1 + FILLED) * count)) ** 0.5
+        if found is not None:
+            if known[1]:
+                falls = float(np.log(number / known[1]) / np.log(known[0] / epsilon))
+                falls = min(max(falls, LEAST_FALLS), MOST_FALLS)
+            known = epsilon, number
+        epsilon *= (2 * number / ((1 + FILLED) * count)) ** (1 / falls)
         if not fails < epsilon < fits:
             epsilon = (fails * fits) ** 0.5
     return best, fits
