@@ -18,7 +18,7 @@ from vegtool.measure.pictures import truth
 from vegtool.measure.views import Camera, direction
 from vegtool.plant import Plant
 
-CELL, COLUMNS = 400, 3
+CELL, COLUMNS = 320, 5
 FOV = 25.0  # degrees
 SKY = (0.60, 0.72, 0.88)  # linear
 SUN = Light(direction=np.array([0.35, 0.9, 0.8]), sun=0.95)

@@ -76,7 +76,7 @@ def test_bark_normals_are_unit_and_look_outward() -> None:
     assert np.abs(vectors[..., :2].mean(axis=(0, 1))).max() < 0.02
 
 
-@pytest.mark.parametrize("name", ["broadleaf", "conifer", "bush", "herb"])
+@pytest.mark.parametrize("name", ["broadleaf", "cherry", "conifer", "bush", "herb"])
 def test_leaves_are_cut_out_cleanly(name: str) -> None:
     for index, kind in enumerate(read_species(name).foliage):
         pixels = leaf_texture(name, index, kind).pixels

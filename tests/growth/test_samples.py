@@ -16,6 +16,7 @@ from vegtool.plant import Plant
 PLANTS = [name for name in SAMPLES if name not in ("statue", "height-field")]
 HEIGHTS = {  # metres
     "broadleaf": 10.0,
+    "cherry": 7.0,
     "conifer": 15.0,
     "bush": 2.0,
     "palm": 8.0,
@@ -123,7 +124,7 @@ def test_materials_say_what_they_are(name: str) -> None:
 
 
 def test_unknown_name_lists_the_choices() -> None:
-    with pytest.raises(UsageError, match=r"no sample 'oka'.*broadleaf, conifer.*height-field"):
+    with pytest.raises(UsageError, match=r"no sample 'oka'.*broadleaf, cherry.*height-field"):
         sample("oka")
 
 

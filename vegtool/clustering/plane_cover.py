@@ -3,19 +3,18 @@
 Décoret, Durand, Sillion, Dorsey: Billboard clouds for extreme model simplification (2003), sections
 3 and 4. A plane is a direction and an offset. A piece is valid for it if each of its corners can
 move onto it by at most epsilon. The density of a plane is the projected area of the pieces that are
-valid for it, less a penalty for those that it just misses on its outer side: they would be left
-over beyond it. The densest cell of a grid of planes is refined to one plane, the pieces that are
+valid for it. The densest cell of a grid of planes is refined to one plane, the pieces that are
 valid for that are taken away, and so on, until all are.
 
-Two things are done otherwise than in the paper. The offset is not subdivided but found: it is where
-most of the intervals of valid offsets overlap, by their sorted ends; the direction is tilted, by
-half as much each time. And densities are sums of whole numbers, so that what is taken away leaves
-nothing behind.
+Three things are done otherwise than in the paper. The offset is not subdivided but found: it is
+where most of the intervals of valid offsets overlap, by their sorted ends; the direction is tilted,
+by half as much each time. Densities are sums of whole numbers, so that what is taken away leaves
+nothing behind. And there is no penalty for pieces that a plane just misses, which costs planes and
+time (docs/methods/plane_space.md).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -32,8 +31,6 @@ CELL = 0.5
 """Of epsilon: a cell's depth, where that takes no more than MOST_OFFSETS."""
 TILTS = 4
 """Times a direction is refined."""
-PENALTY = 1.0
-"""What a missed piece costs, where a valid one gains 1."""
 STEP = 2.0**-44
 """Of all weight: densities are multiples of it, which float64 adds without error."""
 ROUNDING = 1e-9
@@ -129,17 +126,17 @@ def _joined(pieces: Pieces, epsilon: float, reach: float, most: int) -> Cover | 
         return None
     labels = first_valid(pieces, some, reach)
     left = np.flatnonzero(labels < 0)
-    count = len(some.normal)
+    kept = np.unique(labels[labels >= 0])  # of a plane, all pieces may be valid for earlier ones
+    labels = np.searchsorted(kept, labels)
+    normal, offset = some.normal[kept], some.offset[kept]
     if not len(left):
-        return Cover(labels, some.normal, some.offset)
-    rest = cover(pieces.of(left), epsilon, most - count)
+        return Cover(labels, normal, offset)
+    rest = cover(pieces.of(left), epsilon, most - len(kept))
     if rest is None:
         return None
-    labels[left] = count + rest.labels
+    labels[left] = len(kept) + rest.labels
     return Cover(
-        labels,
-        np.concatenate([some.normal, rest.normal]),
-        np.concatenate([some.offset, rest.offset]),
+        labels, np.concatenate([normal, rest.normal]), np.concatenate([offset, rest.offset])
     )
 
 
@@ -168,11 +165,11 @@ class Grid:
         self._count = int(min(np.ceil(length / (CELL * reach)), MOST_OFFSETS))
         self.cell = length / self._count
         self.left = np.ones(len(pieces), dtype=bool)
-        self._density = self._of(np.arange(len(pieces)))
+        self.density = self._of(np.arange(len(pieces)))
 
     def densest(self) -> tuple[FloatArray, Labels]:
         """Direction (3,) of the densest cell, and the pieces that planes about it may pass."""
-        nth, cell = np.unravel_index(int(self._density.argmax()), self._density.shape)
+        nth, cell = np.unravel_index(int(self.density.argmax()), self.density.shape)
         offset = self._start + (float(cell) + 0.5) * self.cell
         about = 2 * self.reach + self.cell
         near = (self.low[nth] - about <= offset) & (offset <= self.high[nth] + about)
@@ -180,37 +177,23 @@ class Grid:
 
     def take(self, rows: Labels) -> None:
         """Pieces off."""
-        self._density -= self._of(rows)
+        self.density -= self._of(rows)
         self.left[rows] = False
 
     def _of(self, rows: Labels) -> FloatArray:
-        """(d, r) of some pieces alone: a cell has what an interval that meets it is worth."""
+        """(d, r) of some pieces alone: a cell has those that a plane in it may be valid for."""
         size = self._count + 1
         row = size * np.arange(len(self.low))[:, None]
-        change = np.zeros(row.size * size)
-        spans = self.low[:, rows], self.high[:, rows], self._area[:, rows]
-        for begin, end, worth in intervals(*spans, self.reach):
-            first, last = (
-                np.floor((at - self._start) / self.cell).astype(np.int64) for at in (begin, end)
-            )
-            first, last = np.clip(first, 0, self._count), np.clip(last + 1, 0, self._count)
-            change += np.bincount((row + first).ravel(), worth.ravel(), change.size)
-            change -= np.bincount((row + last).ravel(), worth.ravel(), change.size)
+        begin, end = self.high[:, rows] - self.reach, self.low[:, rows] + self.reach
+        worth = np.where(begin <= end, self._area[:, rows], 0.0).ravel()
+        first, last = (
+            np.floor((at - self._start) / self.cell).astype(np.int64) for at in (begin, end)
+        )
+        first, last = np.clip(first, 0, self._count), np.clip(last + 1, 0, self._count)
+        change: FloatArray = np.zeros(row.size * size)
+        change += np.bincount((row + first).ravel(), worth, change.size)
+        change -= np.bincount((row + last).ravel(), worth, change.size)
         return np.cumsum(change.reshape(-1, size), axis=1)[:, :-1]
-
-
-def intervals(
-    low: FloatArray, high: FloatArray, area: FloatArray, reach: float
-) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
-    """Offsets, from and to, all (d, p), between which pieces are worth so much: where they are
-    valid, and where they are just missed by a plane that is nearer to the middle."""
-    valid = high - low <= 2 * reach
-    first, last = high - reach, low + reach
-    yield first, last, np.where(valid, area, 0.0)
-    lost = np.where(valid, -PENALTY * area, 0.0)
-    before, after = np.maximum(first - reach, 0.0), np.minimum(last + reach, 0.0)
-    yield before, np.nextafter(first, -np.inf), np.where(before < first, lost, 0.0)
-    yield np.nextafter(last, np.inf), after, np.where(last < after, lost, 0.0)
 
 
 def densest_plane(grid: Grid) -> tuple[Labels, FloatArray, float]:
@@ -235,15 +218,26 @@ def densest_plane(grid: Grid) -> tuple[Labels, FloatArray, float]:
 
 
 def alone(grid: Grid) -> tuple[Labels, FloatArray, float]:
-    """The largest piece that is left, on a plane of its own."""
+    """The plane of the largest piece that is left: that piece, and all that are valid for it."""
     left = np.flatnonzero(grid.left)
     facing = np.add.reduceat(grid.pieces.area, grid.pieces.first, axis=0)[left]
     largest = int((facing**2).sum(axis=1).argmax())
     normal = unit(facing[largest])
-    normal = normal if normal.any() else np.array([0.0, 0.0, 1.0])
-    rows = left[largest : largest + 1]
-    low, high = grid.pieces.of(rows).spans(normal[None])
-    return rows, normal, float(low[0, 0] + high[0, 0]) / 2
+    if not normal.any():
+        normal = across(grid.pieces.of(left[largest : largest + 1]).corners[:, 0])
+    low, high = (of[0] for of in grid.pieces.of(left).spans(normal[None]))
+    offset = float(low[largest] + high[largest]) / 2
+    valid = (high - grid.reach <= offset) & (offset <= low + grid.reach)
+    valid[largest] = True
+    return left[valid], normal, offset
+
+
+def across(corners: FloatArray) -> FloatArray:
+    """(3,) a unit vector across the longest edge of a triangle (3, 3) that has no normal."""
+    edges = np.roll(corners, -1, axis=0) - corners
+    edge = edges[np.linalg.norm(edges, axis=1).argmax()]
+    normal = unit(np.cross(edge, np.eye(3)[np.abs(edge).argmin()]))
+    return normal if normal.any() else np.array([0.0, 0.0, 1.0])
 
 
 def densest_offsets(

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 SAMPLES: dict[str, str] = {
     "broadleaf": "broadleaf tree, 10 m: alpha-tested cards of several leaves",
+    "cherry": "cherry in blossom, 7 m: a bare, forked trunk, cards of flowers",
     "conifer": "conifer, 15 m: alpha-tested cards of needle twigs",
     "bush": "bush, 2 m: several stems, alpha-tested leaf cards",
     "palm": "palm, 8 m: fronds of leaflets as real geometry",

@@ -48,6 +48,24 @@ def grid_triangles(rows: int, columns: int, pointed: bool) -> int:
     return columns * (2 * rows - pointed)
 
 
+def closed_faces(rings: int, columns: int) -> IntArray:
+    """(2 rings columns, 3) faces: a fan below, a grid that closes on itself, a fan above.
+
+    Of a point, rings of vertices, and a point, in this order; seen from above, rings turn
+    counter-clockwise, and the faces look outward.
+    """
+    grid = grid_faces(rings - 1, columns, pointed=False)
+    ring, column = np.divmod(grid, columns + 1)
+    grid = 1 + ring * columns + column % columns
+    around = np.arange(columns)
+    after = (around + 1) % columns
+    top = 1 + rings * columns
+    below = np.stack([np.zeros(columns, np.int64), 1 + after, 1 + around], axis=1)
+    last = 1 + (rings - 1) * columns
+    above = np.stack([last + around, last + after, np.full(columns, top)], axis=1)
+    return np.concatenate([below, grid, above]).astype(np.int32)
+
+
 def pile(faces: IntArray, vertices: int, copies: int) -> IntArray:
     """(copies * f, 3): the same faces for `copies` grids of that many vertices each."""
     offset = np.arange(copies, dtype=np.int32)[:, None, None] * vertices

@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from vegtool.arrays import FloatArray, IntArray, unit
-from vegtool.growth.mesh import grid_faces
+from vegtool.growth.mesh import closed_faces, grid_faces
 from vegtool.growth.noise import octaves
 from vegtool.plant import Material, Plant
 from vegtool.seeding import generator
@@ -62,7 +62,7 @@ def statue(triangles: int | None, seed: int) -> Plant:
     positions += (grain * np.clip(r / 0.05, 0, 1))[..., None] * outward
     bottom, top = positions[0, 0], positions[-1, 0]
     vertices = np.concatenate([[bottom], positions[1:-1].reshape(-1, 3), [top]])
-    faces = _closed_faces(len(radius) - 2, columns)
+    faces = closed_faces(len(radius) - 2, columns)
     v = np.concatenate([[0.0], np.repeat(np.linspace(0, 1, len(radius))[1:-1], columns), [1.0]])
     u = np.concatenate([[0.5], np.tile(angle / (2 * np.pi), len(radius) - 2), [0.5]])
     return Plant(
@@ -115,20 +115,6 @@ def _relief(
         away = (turn / np.radians(wide)) ** 2 + ((y - height) / tall) ** 2
         relief = relief + near * out * np.exp(-np.minimum(away, 60.0))
     return np.asarray(relief)
-
-
-def _closed_faces(rings: int, columns: int) -> IntArray:
-    """(2 rings columns, 3) faces: a fan below, a grid that closes on itself, a fan above."""
-    grid = grid_faces(rings - 1, columns, pointed=False)
-    ring, column = np.divmod(grid, columns + 1)
-    grid = 1 + ring * columns + column % columns
-    around = np.arange(columns)
-    after = (around + 1) % columns
-    top = 1 + rings * columns
-    below = np.stack([np.zeros(columns, np.int64), 1 + after, 1 + around], axis=1)
-    last = 1 + (rings - 1) * columns
-    above = np.stack([last + around, last + after, np.full(columns, top)], axis=1)
-    return np.concatenate([below, grid, above]).astype(np.int32)
 
 
 def _marble(points: FloatArray, rng: np.random.Generator) -> FloatArray:

@@ -63,7 +63,7 @@ class Foliage:
     width: float
     """Metres."""
     texture: str
-    """Which drawing of textures.py: broad twig, needle twig, leaf, flower or blade."""
+    """Which drawing of textures.py: broad, blossom or needle twig, leaf, flower, blade."""
     levels: tuple[int, ...] = ()
     """Branching levels that carry it; none given: the last."""
     along: tuple[float, float] = (0.1, 1.0)

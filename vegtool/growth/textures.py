@@ -205,16 +205,42 @@ def draw_single_leaf(canvas: Canvas, kind: Foliage, rng: np.random.Generator) ->
 
 def draw_flower(canvas: Canvas, kind: Foliage, rng: np.random.Generator) -> None:
     """Petals around a heart, in the middle of the cell."""
+    draw_petals(canvas, kind, (0.0, 0.5), kind.leaves, 0.47, rng)
+
+
+def draw_petals(
+    canvas: Canvas,
+    kind: Foliage,
+    centre: tuple[float, float],
+    petals: int,
+    length: float,
+    rng: np.random.Generator,
+) -> None:
+    """`petals` of that length around a heart."""
     heart = srgb_of(kind.colors[2])
     plain = Foliage(
         1, 1, 1, "", colors=(kind.colors[0], kind.colors[1], kind.colors[1]), slimness=kind.slimness
     )
     turn = rng.uniform(0, 6)
-    for number in range(kind.leaves):
-        angle = turn + 2 * np.pi * number / kind.leaves + rng.normal(0, 0.05)
-        draw_leaf(canvas, plain, (0.0, 0.5), float(angle), 0.47 * rng.uniform(0.92, 1.0), rng)
-    centre = np.array([0.0, 0.5])
-    draw_stalk(canvas, centre, centre + np.array([0.0, 1e-3]), 0.22, heart)
+    for number in range(petals):
+        angle = turn + 2 * np.pi * number / petals + rng.normal(0, 0.05)
+        draw_leaf(canvas, plain, centre, float(angle), length * rng.uniform(0.92, 1.0), rng)
+    middle = np.array(centre)
+    draw_stalk(canvas, middle, middle + np.array([0.0, 1e-3]), 0.22 * length / 0.47, heart)
+
+
+def draw_blossom_twig(canvas: Canvas, kind: Foliage, rng: np.random.Generator) -> None:
+    """Flowers of five petals on stalks, left and right of a twig."""
+    bark = srgb_of("#4d382c")
+    share = np.linspace(0, 1, kind.leaves)
+    hand = np.where(np.arange(kind.leaves) % 2, 1, -1)
+    flowers = np.stack([hand * rng.uniform(0.03, 0.3, kind.leaves), 0.18 + 0.64 * share], axis=1)
+    roots = np.stack([np.zeros(kind.leaves), 0.7 * share], axis=1)
+    for root, flower in zip(roots, flowers, strict=True):
+        draw_stalk(canvas, root, flower, 0.012, bark)
+    draw_stalk(canvas, np.zeros(2), np.array([0.0, 0.72]), 0.018, bark)
+    for x, y in rng.permutation(flowers).tolist():
+        draw_petals(canvas, kind, (x, y), 5, float(rng.uniform(0.13, 0.16)), rng)
 
 
 def draw_blade(canvas: Canvas, kind: Foliage, rng: np.random.Generator) -> None:
@@ -231,6 +257,7 @@ def draw_blade(canvas: Canvas, kind: Foliage, rng: np.random.Generator) -> None:
 
 DRAWINGS = {
     "broad twig": draw_broad_twig,
+    "blossom twig": draw_blossom_twig,
     "needle twig": draw_needle_twig,
     "leaf": draw_single_leaf,
     "flower": draw_flower,

@@ -12,8 +12,8 @@ from functools import cached_property
 import numpy as np
 
 from vegtool.arrays import FloatArray, IntArray, unit
-from vegtool.clustering.features import samples
-from vegtool.clustering.plane_space import pieces_of, planes_for
+from vegtool.clustering.features import own_corners, samples
+from vegtool.clustering.plane_space import by_first_face, pieces_of, planes_for
 from vegtool.hybrid.cost import misplaced
 from vegtool.hybrid.shown import pictured, shown_fraction
 from vegtool.plant import Plant
@@ -54,12 +54,14 @@ class Cloud:
         """(f,) 0 to 1 how wrong each face is drawn: displaced, or not shown from all around."""
         plant, count = self.plant, len(self.plant.faces)
         radius = plant.radius or 1.0
-        normals = unit(plant.face_area_vectors / radius**2)
+        _, axes = own_corners(plant)  # a plant that is turned is seen by viewers that turn along
+        normals = unit(plant.face_area_vectors / radius**2) @ axes.T
+        planes = self.normal @ axes.T
         height = self.heights()
         away = np.full(count, np.inf)
         np.minimum.at(away, self.face, np.abs(height).mean(axis=1))
-        pictures = np.zeros((count, pictured(normals[:1], self.normal[:1]).shape[1]))
-        np.add.at(pictures, self.face, pictured(normals[self.face], self.normal[self.plane]))
+        pictures = np.zeros((count, pictured(normals[:1], planes[:1]).shape[1]))
+        np.add.at(pictures, self.face, pictured(normals[self.face], planes[self.plane]))
         unshown = 1 - shown_fraction(normals, pictures)
         return np.asarray(np.clip(misplaced(away, self.reach) + unshown, 0.0, 1.0))
 
@@ -85,7 +87,7 @@ class Cloud:
 def cloud_of(plant: Plant, count: int, progress: Progress = silent) -> Cloud:
     """At most `count` planes that together pass all faces, by about the least distance that allows
     it."""
-    of_face = samples(plant, 0.0, 1).of_face
+    of_face = by_first_face(samples(plant, 0.0, 1).of_face)
     pieces, axes = pieces_of(plant, of_face)
     found = planes_for(pieces, count, progress)
     label = found.labels[of_face]

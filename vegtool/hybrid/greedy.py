@@ -108,9 +108,7 @@ class Descent:
         self.solid = ~cut_out[cloud.plant.face_material]
         self.uses = np.bincount(welded.faces.ravel(), minlength=len(welded.positions))
         self.bodies = self.connected(np.flatnonzero(self.solid))
-        on_cloud = np.zeros(count, dtype=bool)
-        on_cloud[cloud.face] = True
-        self.terms = sum(self.board, Terms(float(self.wrong[on_cloud].sum())))
+        self.terms = sum(self.board, Terms(float(self.wrong.sum())))
 
     def again(self, weights: Weights) -> Descent:
         """From the start, with other weights; what is known stays so."""

@@ -7,15 +7,16 @@ its place; area that is lost is not shown.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vegtool.arrays import FloatArray, IntArray
+from vegtool.arrays import FloatArray, IntArray, unit
 from vegtool.hybrid.cost import misplaced
 from vegtool.meshes.collapse import Collapsed, carried, edges_collapsed
 from vegtool.meshes.distance import to_triangles
 from vegtool.meshes.pieces import Surface
+from vegtool.seeding import generator
 
 FEWEST = 4
 """Triangles: of no more, none is left out."""
@@ -23,6 +24,9 @@ RATIO = 2**0.5
 """Of the triangles of one reduction to those of the next."""
 AGGRESSIVE = 7.0
 """Of the collapse: edges go up to any error, those of the least first."""
+
+ROUGH = 1e-4
+"""Roots of a surface's area, by which its vertices are moved out or in before it is reduced."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,17 +54,44 @@ def reductions(surface: Surface, reach: float, borders: bool) -> Reductions:
     """Of a surface, down to FEWEST triangles or where no edge may go. borders: whether open ones
     stay."""
     surfaces, became, wrong = [surface], [surface.faces], [0.0]
-    target = len(surface.faces) / RATIO
+    target, whole = len(surface.faces) / RATIO, float(surface.areas.sum())
     while target >= FEWEST:
-        made = edges_collapsed(surface, int(target), AGGRESSIVE, borders)
+        made = collapsed(surface, int(target), borders)
         if not 0 < len(made.faces) < len(surfaces[-1].faces):
             break
         surfaces.append(carried(surface, made))
         became.append(made.vertex)
-        lost = max(0.0, float(surface.areas.sum() - surfaces[-1].areas.sum()))
-        wrong.append(displaced(surface, made, reach) + lost)
+        lost = max(0.0, whole - float(surfaces[-1].areas.sum()))
+        wrong.append(min(displaced(surface, made, reach) + lost, whole))
         target = min(target, len(made.faces)) / RATIO
     return Reductions(tuple(surfaces), tuple(became), np.array(wrong))
+
+
+def collapsed(surface: Surface, target: int, borders: bool) -> Collapsed:
+    """Edges collapsed in lengths of the surface's own size, for errors up to fixed ones go first;
+    and roughly, for where a surface is flat, errors are alike everywhere and what is least is
+    rounding."""
+    used, first, local = np.unique(surface.faces, return_index=True, return_inverse=True)
+    faces = local.reshape(-1, 3).astype(np.int32)
+    size = float(surface.areas.sum()) ** 0.5 or 1.0
+    exact = surface.positions[used]
+    noise = generator(0, "hybrid", "rough").uniform(-ROUGH, ROUGH, surface.faces.size)[first]
+    rough = exact / size + noise[:, None] * outward(exact / size, faces)
+    made = edges_collapsed(Surface(rough, faces, surface.corners), target, AGGRESSIVE, borders)
+    if not len(made.faces):
+        return made
+    positions = size * made.positions
+    still = (made.vertex >= 0) & (made.positions[made.vertex] == rough[faces]).all(axis=2)
+    positions[made.vertex[still]] = exact[faces[still]]
+    return replace(made, positions=positions)
+
+
+def outward(positions: FloatArray, faces: IntArray) -> FloatArray:
+    """(w, 3) unit normals of vertices, by the areas of the faces about them."""
+    a, b, c = (positions[faces[:, corner]] for corner in range(3))
+    area = np.repeat(np.cross(b - a, c - a), 3, axis=0)
+    corner = faces.ravel()
+    return unit(np.stack([np.bincount(corner, x, len(positions)) for x in area.T], axis=1))
 
 
 def displaced(surface: Surface, made: Collapsed, reach: float) -> float:

@@ -39,10 +39,13 @@ def edges_collapsed(
     stay as they are."""
     used, local = np.unique(surface.faces, return_inverse=True)
     faces = local.reshape(-1, 3).astype(np.int32)
+    whole = faces[uncollapsed(faces)]
+    if not len(whole):
+        return Collapsed(np.empty((0, 3)), whole, np.full(faces.shape, -1, np.int32))
     positions, left, collapses = simplify(
         surface.positions[used],
-        faces,
-        target_count=min(target, len(faces)),
+        whole,
+        target_count=min(target, len(whole)),
         agg=aggressiveness,
         return_collapses=True,
         preserve_border=borders,

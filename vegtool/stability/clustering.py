@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from fractions import Fraction
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 
@@ -43,10 +43,16 @@ def inertia(plant: Plant, labels: IntArray, options: ClusterOptions, count: int)
     return error(points, face_weights(plant), labels.astype(np.int64))
 
 
+@cache
+def of_tree(method: str, options: ClusterOptions) -> IntArray:
+    """Labels of the tree where it stands."""
+    return cluster(tree(), method, COUNT, options)
+
+
 def motion_changes_nothing(method: str, motion: Motion, options: ClusterOptions) -> Outcome:
     """Labels found on the plant moved are as good on the plant itself as its own."""
     plant = tree()
-    here = cluster(plant, method, COUNT, options)
+    here = of_tree(method, options)
     there = cluster(motion.plant(plant), method, COUNT, options)
     found, own = (inertia(plant, labels, options, COUNT) for labels in (there, here))
     note = "same clusters" if np.array_equal(here, there) else "other clusters"
