@@ -13,7 +13,8 @@ The cost is a sum over billboards and over connected parts of the mesh, so that 
 of its terms, and most proposals stay as they are. They wait in order of what they save, and are
 looked at again when their turn comes (lazy evaluation; Minoux 1978).
 
-The poster's form looks at the billboard alone that costs most, and stops where that saves nothing.
+The poster's form looks at the billboard alone that costs most, of those that show what may leave,
+and stops where that saves nothing.
 """
 
 from __future__ import annotations
@@ -289,16 +290,17 @@ def _costliest(start: Descent, began: float) -> Iterator[Step]:
         costs = [
             board.cost(start.weights)
             + start.weights.error * float(start.wrong[start.cloud.face[pairs]].sum())
-            for board, pairs in zip(start.board, start.pairs, strict=True)
+            if len(start.shown_by(plane))
+            else -1.0
+            for plane, (board, pairs) in enumerate(zip(start.board, start.pairs, strict=True))
         ]
-        plane = int(np.argmax(costs))
-        faces = start.shown_by(plane)
-        if not len(faces):
+        offers = list(start.proposals(int(np.argmax(costs))))
+        if not offers:
             return
-        made = start.proposal(faces)
-        if made.change.cost(start.weights) >= 0:
+        best = min(offers, key=lambda one: one.change.cost(start.weights))
+        if best.change.cost(start.weights) >= -LEAST * start.terms.cost(start.weights):
             return
-        start.accept(made)
+        start.accept(best)
         yield _step(start, began)
 
 

@@ -26,6 +26,8 @@ from vegtool.refine.mesh import joined
 from vegtool.refine.planes import billboards_about, none
 from vegtool.timing import timed
 
+TRIES = 4
+"""At a level of no more triangles than are allowed."""
 STARTS_WITH = 0.5
 """Of the triangles that a budget allows: billboards. What they leave is for the mesh."""
 
@@ -51,16 +53,31 @@ def hybrid_level(
     count = max(1, int(share * wanted.triangles / PER_BILLBOARD))
     with timed(seconds, "cloud"):
         cloud = cloud_of(source.plant, count, lambda stage, f: progress(stage, 0.3 * f))
-    with timed(seconds, "descent"):
-        found = begun(cloud, aim if isinstance(aim, Weights) else Weights())
-        report = _part_of(progress, 0.3, 0.2)
-        if isinstance(aim, Budget):
-            found = within(found, aim, cheap, report)
-        else:
-            for _ in descent(found, cheap, report):
-                pass
-    level = drawn_as(source, wanted, found, _part_of(progress, 0.5, 0.5))
+    start = begun(cloud, aim if isinstance(aim, Weights) else Weights())
+    report = _part_of(progress, 0.3, 0.7)
+    if isinstance(aim, Budget):
+        level = kept_to(source, wanted, start, aim, cheap, report)
+    else:
+        for _ in descent(start, cheap, report):
+            pass
+        level = drawn_as(source, wanted, start, report)
     return replace(level, seconds={**seconds, **level.seconds})
+
+
+def kept_to(
+    source: Source, wanted: Wanted, start: Descent, budget: Budget, cheap: bool = False,
+    progress: Progress = silent,
+) -> Level:  # fmt: skip
+    """The level of the least error that a budget allows. Billboards whose sides differ stand in the
+    file twice, which is seen when they are drawn: then less is tried."""
+    most = budget.triangles
+    for _ in range(TRIES):
+        found = within(start, replace(budget, triangles=most), cheap, progress)
+        level = drawn_as(source, wanted, found, progress)
+        if level.triangles <= budget.triangles:
+            break
+        most = max(PER_BILLBOARD, most - (level.triangles - budget.triangles))
+    return level
 
 
 def _part_of(progress: Progress, before: float, share: float) -> Progress:

@@ -20,7 +20,7 @@ from vegtool.seeding import generator
 
 FEWEST = 4
 """Triangles: of no more, none is left out."""
-RATIO = 2**0.5
+RATIO = 2**0.25
 """Of the triangles of one reduction to those of the next."""
 AGGRESSIVE = 7.0
 """Of the collapse: edges go up to any error, those of the least first."""

@@ -1,0 +1,272 @@
+"""Hybrids beside pure clouds and pure meshes: what they cost, and how far they are from the truth.
+
+    python benchmarks/hybrid.py                                    # a quarter of an hour
+    python benchmarks/hybrid.py --plants ash=models/ash.glb        # another plant beside them
+    python benchmarks/hybrid.py --record --markdown --figures docs
+
+After "Hybrid Billboard Clouds" (sketch), figure 1, and its poster, figures 1 and 2, on like models:
+a cherry of `vegtool sample`, and a cartoon figure and an airplane made by script (solids/).
+
+beside: of each model a cloud of planes, a mesh reduced to so many triangles, and a hybrid that has
+no more triangles than the mesh and makes no more fragments than the cloud. dial: the figure with
+four weights of polygons, from nearly a mesh to nearly a cloud. steps: a hybrid's cost from step to
+step, of both ways to look for proposals, with the seconds that they take.
+
+What is missed of what is asked is told at the end, and the exit status is then 1.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from recorded import record, written
+from solids.airplane import airplane
+from solids.figure import figure
+
+from vegtool import __version__
+from vegtool.baselines.quadric import quadric
+from vegtool.formats import read_plant
+from vegtool.formats.png import encode
+from vegtool.gl.context import describe
+from vegtool.gl.upload import PlantBuffers
+from vegtool.growth import sample
+from vegtool.hybrid.cloud import cloud_of
+from vegtool.hybrid.greedy import Descent, descent
+from vegtool.hybrid.level import begun, drawn_as, kept_to
+from vegtool.hybrid.options import Budget, Weights
+from vegtool.lod import Display, Level
+from vegtool.measure.background import bytes_over
+from vegtool.measure.chain import views_of
+from vegtool.measure.options import MeasureOptions
+from vegtool.measure.pictures import client_plant, fragments, live, truth
+from vegtool.measure.scores import TruthsAt, scores
+from vegtool.plant import Plant
+from vegtool.refine.level import Source, Wanted, source_of
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGE = ROOT / "docs" / "methods" / "hybrid.md"
+MARK = "<!-- {} made by benchmarks/hybrid.py -->"
+PARTS = ("beside", "dial", "steps")
+DIAL = (0.03, 0.3, 2.0, 30.0)
+"""Weights of polygons."""
+SECONDS = 30.0
+"""Asked of the cherry, the cloud included."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """planes: of the cloud. triangles: of the mesh, and at most of the hybrid. pixels: of the
+    model's longest side."""
+
+    name: str
+    planes: int
+    triangles: int
+    pixels: float
+
+
+CASES = (
+    Case("cherry", 140, 1840, 300.0),
+    Case("figure", 19, 250, 300.0),
+    Case("airplane", 93, 300, 300.0),
+)
+"""As the sketch and its poster have them: 140 billboards and 1,840 polygons, 19 and 250."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """A model, and what it looks like."""
+
+    plant: Plant
+    source: Source
+    truth_at: TruthsAt
+    near_m: float
+
+    def level(self, found: Descent) -> Level:
+        return drawn_as(self.source, Wanted(0, self.near_m), found)
+
+    def row(self, case: str, what: str, level: Level, seconds: float) -> dict[str, Any]:
+        true = self.truth_at(self.near_m)
+        found = scores(true, level).values
+        cameras = [camera for row in true.cameras for camera in row]
+        with PlantBuffers(client_plant(level)) as buffers:
+            shaded = float(np.mean([fragments(buffers, camera) for camera in cameras]))
+        return {
+            "model": case,
+            "of": len(self.plant.faces),
+            "what": what,
+            "triangles": level.triangles,
+            "billboards": 0 if level.billboards is None else len(level.billboards),
+            "texels": level.texels,
+            "fragments": round(shaded),
+            "flip": round(float(found["flip"].mean()), 4),
+            "silhouette": round(float(found["silhouette"].mean()), 4),
+            "false_holes": round(float(found["false_holes"].mean()), 4),
+            "seconds": round(seconds, 1),
+        }
+
+    def pictures(self, levels: Sequence[Level], view: int = 0) -> np.ndarray:
+        """The truth and the levels, side by side."""
+        true = self.truth_at(self.near_m)
+        camera, light = true.cameras[0][view], true.light(true.views[view])
+        with PlantBuffers(self.plant) as buffers:
+            found = [bytes_over(truth(buffers, camera, light))]
+        for level in levels:
+            with PlantBuffers(client_plant(level), mipmaps=True) as buffers:
+                found.append(bytes_over(live(buffers, camera, light)))
+        return np.concatenate(found, axis=1)
+
+
+@contextmanager
+def bench(plant: Plant, pixels: float) -> Iterator[Bench]:
+    display = Display()
+    with PlantBuffers(plant) as buffers:
+        truth_at = TruthsAt(plant, views_of(MeasureOptions(views="all")), display, buffers)
+        near_m = display.distance_m(pixels / plant.extent)
+        yield Bench(plant, source_of(buffers, truth_at), truth_at, near_m)
+
+
+def say(text: str) -> None:
+    print(text, flush=True)
+
+
+def told(row: dict[str, Any]) -> dict[str, Any]:
+    say("  ".join(f"{key} {value}" for key, value in row.items()))
+    return row
+
+
+def beside(case: Case, plant: Plant, missed: list[str]) -> tuple[list[dict[str, Any]], np.ndarray]:
+    with bench(plant, case.pixels) as on:
+        began = perf_counter()
+        start = begun(cloud_of(plant, case.planes), Weights())
+        cloud = on.level(start)
+        rows = [told(on.row(case.name, "cloud", cloud, perf_counter() - began))]
+        began = perf_counter()
+        mesh = quadric(plant, case.triangles)
+        rows.append(told(on.row(case.name, "mesh", mesh, perf_counter() - began)))
+        began = perf_counter()
+        budget = Budget(mesh.triangles, start.terms.fill)
+        hybrid = kept_to(on.source, Wanted(0, on.near_m), start, budget)
+        rows.append(told(on.row(case.name, "hybrid", hybrid, perf_counter() - began)))
+        of_cloud, of_mesh, of_hybrid = rows
+        for key, other in (("triangles", of_mesh), ("fragments", of_cloud), ("texels", of_cloud)):
+            if of_hybrid[key] > other[key]:
+                missed.append(f"{case.name}: {key} {of_hybrid[key]} of {other[key]}")
+        for key in ("flip", "silhouette"):
+            least = min(of_cloud[key], of_mesh[key])
+            if not of_hybrid[key] < least:
+                missed.append(f"{case.name}: {key} {of_hybrid[key]} of {least}")
+        return rows, on.pictures((cloud, mesh, hybrid))
+
+
+def dial(plant: Plant) -> tuple[list[dict[str, Any]], np.ndarray]:
+    with bench(plant, CASES[1].pixels) as on:
+        start = begun(cloud_of(plant, 69), Weights())
+        rows, levels = [], []
+        for weight in DIAL:
+            began = perf_counter()
+            now = start.again(Weights(1.0, weight, 0.1))
+            for _ in descent(now):
+                pass
+            levels.append(on.level(now))
+            row = on.row("figure", f"polygons={weight:g}", levels[-1], perf_counter() - began)
+            rows.append(told(row))
+        return rows, on.pictures(levels)
+
+
+def steps(plant: Plant, missed: list[str]) -> list[dict[str, Any]]:
+    """Of the cherry, at some of the steps."""
+    began = perf_counter()
+    start = begun(cloud_of(plant, CASES[0].planes), Weights(1.0, 0.2, 0.1))
+    cloud_s = perf_counter() - began
+    rows = []
+    for proposals, cheap in (("all", False), ("costliest", True)):
+        taken = list(descent(start.again(start.weights), cheap))
+        costs = [step.cost for step in taken]
+        if (np.diff(costs) > 0).any():
+            missed.append(f"steps, {proposals}: the cost rises")
+        if cloud_s + taken[-1].seconds > SECONDS:
+            missed.append(f"steps, {proposals}: {cloud_s + taken[-1].seconds:.0f} s of {SECONDS:g}")
+        some = np.unique(np.linspace(0, len(taken) - 1, 9).round().astype(int))
+        for number in some.tolist():
+            step = taken[number]
+            row = {
+                "proposals": proposals,
+                "step": number,
+                "billboards": step.billboards,
+                "triangles": step.triangles,
+                "error": round(step.terms.error, 4),
+                "polygons": round(step.terms.polygons, 4),
+                "fill": round(step.terms.fill, 3),
+                "cost": round(step.cost, 4),
+                "seconds": round(cloud_s + step.seconds, 2),
+            }
+            rows.append(told(row))
+    return rows
+
+
+def table(rows: Sequence[dict[str, Any]]) -> str:
+    keys = list(rows[0])
+    lines = [" | ".join(key.replace("_", " ") for key in keys), "|".join("---" for _ in keys)]
+    lines += [" | ".join(_words(row[key]) for key in keys) for row in rows]
+    return "\n".join(f"| {line} |" if "---" not in line else f"|{line}|" for line in lines)
+
+
+def _words(value: Any) -> str:
+    return f"{value:,}" if isinstance(value, int) else str(value)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--parts", default=",".join(PARTS))
+    parser.add_argument("--plants", nargs="*", default=[], metavar="NAME=FILE")
+    parser.add_argument("--record", action="store_true")
+    parser.add_argument("--markdown", action="store_true")
+    parser.add_argument("--figures", type=Path)
+    given = parser.parse_args()
+    parts = given.parts.split(",")
+    if set(parts) - set(PARTS):
+        parser.error(f"unknown parts; known: {', '.join(PARTS)}")
+    models = {"cherry": sample("cherry"), "figure": figure(), "airplane": airplane()}
+    cases = list(CASES)
+    for word in given.plants:
+        name, _, file = word.partition("=")
+        models[name] = read_plant(Path(file))
+        cases.append(Case(name, 140, 1840, 300.0))
+    missed: list[str] = []
+    found: dict[str, list[dict[str, Any]]] = {}
+    pictures: dict[str, np.ndarray] = {}
+    if "beside" in parts:
+        found["beside"] = []
+        for case in cases:
+            rows, pictures[f"hybrid_{case.name}"] = beside(case, models[case.name], missed)
+            found["beside"] += rows
+    if "dial" in parts:
+        found["dial"], pictures["hybrid_dial"] = dial(models["figure"])
+    if "steps" in parts:
+        found["steps"] = steps(models["cherry"], missed)
+    if given.record:
+        machine = {"version": __version__, "renderer": describe().renderer, "cores": os.cpu_count()}
+        for name, rows in found.items():
+            record(f"hybrid_{name}", [{**machine, **row} for row in rows])
+    if given.markdown:
+        for name, rows in found.items():
+            written(PAGE, MARK.format(name), table(rows))
+    if given.figures is not None:
+        for name, pixels in pictures.items():
+            (given.figures / f"{name}.png").write_bytes(encode(pixels))
+    for sentence in missed:
+        say(f"missed: {sentence}")
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
