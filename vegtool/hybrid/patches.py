@@ -35,15 +35,18 @@ from vegtool.progress import Progress, silent
 def patched(cloud: Cloud, further: int, progress: Progress = silent) -> Cloud:
     """A cloud whose planes show what they can of what no other does, and at most so many planes
     more, none of which moves a face by more than the others may. Nothing is random."""
-    work = Patching(cloud)
-    if not work.surface.any():
+    cut_out = np.array([m.alpha_mode == "mask" for m in cloud.plant.materials])
+    if not cloud.plant.radius or cut_out[cloud.plant.face_material].all():
         return cloud
+    work = Patching(cloud)
     count = len(cloud.normal)
     for plane in range(count + further):
         progress("patches", plane / (count + further))
         if plane >= count and not work.one_more():
             break
         work.show(plane)
+        if not len(work.faces[plane]):
+            break
     planes = [plane for plane, faces in enumerate(work.faces) if len(faces)]
     faces = [work.faces[plane] for plane in planes]
     return replace(

@@ -71,8 +71,6 @@ def sights(corners: FloatArray, both_sides: Bools, which: Bools, reach: float) -
     """Of some faces, (f,) bool, of (f, 3, 3), by rays that are close enough for the cracks between
     planes that move faces by `reach`. both_sides: (f,) whether they are seen from behind too."""
     rays = Rays.around(corners, DIRECTIONS)
-    if not rays.extent:  # a point, which nobody sees
-        which = np.zeros_like(which)
     cells = int(np.clip(rays.extent / max(CELL * reach, TINY), FEWEST, MOST))
     rays = replace(rays, cells=cells)
     first = np.full(DIRECTIONS * cells**2, -1, dtype=np.int64)
