@@ -9,8 +9,8 @@ import pytest
 from plants import plant_of
 
 from vegtool.arrays import FloatArray
-from vegtool.clustering.plane_cover import even_hemisphere
-from vegtool.hybrid.cloud import Cloud
+from vegtool.clustering.plane_cover import Cover, even_hemisphere
+from vegtool.hybrid.cloud import Cloud, cloud_of
 from vegtool.hybrid.patches import Missing, patched
 from vegtool.hybrid.sights import sights
 from vegtool.plant import Plant
@@ -187,6 +187,16 @@ def test_a_point_is_left_as_it_is() -> None:
     one = np.zeros(1, np.int32)
     cloud = Cloud(plant, one, one, np.array([[0, 0, 1.0]]), 0.0)
     assert patched(cloud, 1) is cloud
+
+
+def test_planes_that_are_left_without_faces_are_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Of very many faces planes are sought for some; all of a plane's may have gone to those before.
+    square = np.zeros(1, dtype=np.int64)
+    found = Cover(square + 1, np.eye(3)[1:], np.zeros(2))
+    monkeypatch.setattr("vegtool.hybrid.cloud.planes_for", lambda *_: found)
+    cloud = cloud_of(plant_of(SQUARE), 2)
+    assert cloud.plane.tolist() == [0, 0]
+    assert len(cloud.normal) == len(cloud.billboards()) == 1
 
 
 def test_billboards_lie_halfway_between_their_faces() -> None:

@@ -113,7 +113,7 @@ def cloud_of(plant: Plant, count: int, progress: Progress = silent) -> Cloud:
     of_face = by_first_face(samples(plant, 0.0, 1).of_face)
     pieces, axes = pieces_of(plant, of_face)
     found = planes_for(pieces, count, progress)
-    label = found.labels[of_face]
+    used, label = np.unique(found.labels[of_face], return_inverse=True)
     order = np.argsort(label, kind="stable").astype(np.int32)
-    cloud = Cloud(plant, order, label[order].astype(np.int32), found.normal @ axes, 1.0)
+    cloud = Cloud(plant, order, label[order].astype(np.int32), found.normal[used] @ axes, 1.0)
     return replace(cloud, reach=float(np.abs(cloud.heights()).max()))
