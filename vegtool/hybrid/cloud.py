@@ -16,8 +16,10 @@ from vegtool.clustering.features import own_corners, samples
 from vegtool.clustering.plane_space import by_first_face, pieces_of, planes_for
 from vegtool.hybrid.cost import misplaced
 from vegtool.hybrid.shown import pictured, shown_fraction
+from vegtool.lod import Billboards
 from vegtool.plant import Plant
 from vegtool.progress import Progress, silent
+from vegtool.refine.planes import billboards_about
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,16 +74,37 @@ class Cloud:
             self, face=self.face[pairs], plane=plane.astype(np.int32), normal=self.normal[used]
         )
 
-    def heights(self) -> FloatArray:
-        """(q, 3) radii of the corners of each pair's face over its plane, which lies halfway
-        between the outermost ones."""
-        plant = self.plant
-        corners = (plant.corners[self.face] - plant.center) / (plant.radius or 1.0)
-        height = np.einsum("qci,qi->qc", corners, self.normal[self.plane])
+    @cached_property
+    def offset(self) -> FloatArray:
+        """(k,) radii from the plant's centre along the normal: a plane lies halfway between the
+        outermost corners of its faces."""
+        height = self._along()
         first = np.flatnonzero(np.diff(self.plane, prepend=-1))
         low = np.minimum.reduceat(height.min(axis=1), first)
         high = np.maximum.reduceat(height.max(axis=1), first)
-        return np.asarray(height - ((low + high) / 2)[self.plane][:, None])
+        return np.asarray((low + high) / 2)
+
+    def heights(self) -> FloatArray:
+        """(q, 3) radii of the corners of each pair's face over its plane."""
+        return np.asarray(self._along() - self.offset[self.plane][:, None])
+
+    def billboards(self) -> Billboards:
+        """One for each plane, and on it."""
+        plant, normal = self.plant, self.normal
+        about = billboards_about(self.shown, self.plane, normal)
+        middle = self.offset * (plant.radius or 1.0)
+        off = middle - np.einsum("ki,ki->k", about.center - plant.center, normal)
+        return replace(
+            about,
+            center=about.center + off[:, None] * normal,
+            half_depth=about.half_depth + np.abs(off),
+        )
+
+    def _along(self) -> FloatArray:
+        """(q, 3) radii of the corners of each pair's face from the centre, along the normal."""
+        plant = self.plant
+        corners = (plant.corners[self.face] - plant.center) / (plant.radius or 1.0)
+        return np.asarray(np.einsum("qci,qi->qc", corners, self.normal[self.plane]))
 
 
 def cloud_of(plant: Plant, count: int, progress: Progress = silent) -> Cloud:
@@ -90,7 +113,7 @@ def cloud_of(plant: Plant, count: int, progress: Progress = silent) -> Cloud:
     of_face = by_first_face(samples(plant, 0.0, 1).of_face)
     pieces, axes = pieces_of(plant, of_face)
     found = planes_for(pieces, count, progress)
-    label = found.labels[of_face]
+    used, label = np.unique(found.labels[of_face], return_inverse=True)
     order = np.argsort(label, kind="stable").astype(np.int32)
-    cloud = Cloud(plant, order, label[order].astype(np.int32), found.normal @ axes, 1.0)
+    cloud = Cloud(plant, order, label[order].astype(np.int32), found.normal[used] @ axes, 1.0)
     return replace(cloud, reach=float(np.abs(cloud.heights()).max()))
