@@ -24,7 +24,7 @@ from vegtool.refine.planes import billboards_about
 
 CONE = 0.6
 """Cosine: faces of a chart look no farther apart than that from the first of them, 53 degrees."""
-LEAST_SIDE, LEAST_AREA = 4.0, 128.0
+LEAST_SIDE, LEAST_AREA = 4.0, 256.0
 """Texels of a picture that is worth its gutters."""
 SAMPLES = 4
 """Points of the mesh for each face of the original, about which the nearest is looked for."""

@@ -23,7 +23,7 @@ from vegtool.progress import Progress, silent
 from vegtool.refine.color import unbiased_color
 from vegtool.refine.level import Source, Wanted, as_measured
 from vegtool.refine.mesh import joined
-from vegtool.refine.planes import billboards_about, none
+from vegtool.refine.planes import none
 from vegtool.timing import timed
 
 TRIES = 4
@@ -35,7 +35,7 @@ STARTS_WITH = 0.5
 def begun(cloud: Cloud, weights: Weights) -> Descent:
     """A hybrid that is all billboards."""
     plant = cloud.plant
-    about = billboards_about(cloud.shown, cloud.plane, cloud.normal)
+    about = cloud.billboards()
     corners = (cloud.shown.corners - plant.center) / (plant.radius or 1.0)
     sides = [np.einsum("qci,qi->qc", corners, side[cloud.plane]) for side in (about.u, about.v)]
     ends = [end for side in sides for end in (side.min(axis=1), side.max(axis=1))]
@@ -141,9 +141,7 @@ def baked(
     shown = rest.shown_and(np.empty(0, np.int32) if pictures is None else pictures.face)
     labels = np.full(len(shown.faces), -1, dtype=np.int32)
     labels[: len(rest.face)] = rest.plane
-    billboards = none()
-    if len(rest.face):
-        billboards = billboards_about(rest.shown, rest.plane, rest.normal)
+    billboards = rest.billboards() if len(rest.face) else none()
     if pictures is not None:
         nth = len(rest.face) + np.arange(len(pictures.face), dtype=np.int32)
         pictures = replace(pictures, face=nth)
