@@ -390,7 +390,7 @@ def level_maker(
     from vegtool.refine.level import Wanted, refined_level, source_of
 
     source = source_of(buffers, truth_at, lit)
-    if options.method == HYBRID:
+    if options.method == HYBRID and not casts:  # a shadow has no colours to keep
         return partial(_hybrid, source, options)
 
     def make(count: int, near_m: float, progress: Progress) -> Level:

@@ -337,8 +337,8 @@ def level_triangles(level: Level) -> Triangles:
 
     Vertices of a hybrid's mesh that are on no chart show the middle of the white block: their
     texture coordinates stand still over every face, so that clients sample it at full size,
-    whatever the distance.
-    Their normals are the vertices' own (the block's normal is flat), so that any tangent will do.
+    whatever the distance. Their normals are the vertices' own (the block's normal is flat), so that
+    any tangent will do.
     """
     quads = billboard_quads(level)
     if level.kind != "hybrid":

@@ -160,6 +160,14 @@ def test_convert_makes_hybrids() -> None:
         assert level.atlas.color.tobytes() == again.atlas.color.tobytes()
 
 
+def test_a_hybrid_has_a_shadow() -> None:
+    """What throws it is made as for other levels: pictures of the mesh have no use in white."""
+    options = ConvertOptions(method="hybrid", levels=1, pixels=64.0, shadow_proxy=40)
+    made = convert(ball(), options, MeasureOptions(measure="off"))
+    assert made.shadow is not None and made.shadow.level.charts is None
+    assert 0 < made.shadow.level.triangles <= 40
+
+
 @pytest.mark.parametrize(
     ("given", "told"),
     [

@@ -24,7 +24,6 @@ RATIO = 2**0.25
 """Of the triangles of one reduction to those of the next."""
 AGGRESSIVE = 7.0
 """Of the collapse: edges go up to any error, those of the least first."""
-
 ROUGH = 1e-4
 """Roots of a surface's area, by which its vertices are moved out or in before it is reduced."""
 
@@ -32,8 +31,8 @@ ROUGH = 1e-4
 @dataclass(frozen=True, eq=False)
 class Reductions:
     """r of a surface of n triangles, the surface as it is first. became: of each, (n, 3) what has
-    become of the corners, -1 for nothing. wrong: (r,) squared radii,
-    what is displaced or not shown."""
+    become of the corners, -1 for nothing. wrong: (r,) squared radii, what is displaced or not
+    shown."""
 
     surfaces: tuple[Surface, ...]
     became: tuple[IntArray, ...]
