@@ -5,7 +5,7 @@ import subprocess
 import sys
 
 import pytest
-from baselines.baseline_cases import cards
+from baseline_cases import cards
 
 from vegtool.baselines import BASELINES, baseline
 

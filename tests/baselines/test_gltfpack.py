@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from baselines.baseline_cases import cards
+from baseline_cases import cards
 
 from vegtool.baselines import baseline
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from baselines.baseline_cases import plant_from, sphere
+from baseline_cases import plant_from, sphere
 
 from vegtool.arrays import unit
 from vegtool.baselines.octahedral import FRAMES, Octahedral, directions, nearest

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hybrid.hybrid_cases import (
+from hybrid_cases import (
     LEAF,
     ball,
     book,

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hybrid.hybrid_cases import ball, book, grid, mesh, together, tube
+from hybrid_cases import ball, book, grid, mesh, together, tube
 
 from vegtool.hybrid.cost import DISPLACED, Terms, Weights, misplaced
 from vegtool.hybrid.reduction import FEWEST, ROUGH, reductions

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from refine.wood_cases import all_of, straight, tree, tube, wood
+from wood_cases import all_of, straight, tree, tube, wood
 
 from vegtool.arrays import FloatArray
 from vegtool.plant import Material, Plant
