@@ -1,11 +1,14 @@
-"""An airplane of about 3,000 triangles: a fuselage of revolution, wings, a tail, a canopy, and a
-propeller."""
+"""An airplane of 2,960 or of 22,814 triangles: a fuselage of revolution, wings, a tail, a canopy,
+and a propeller."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import PchipInterpolator
 
 from solids.shapes import Piece, ellipsoid, lofted, plant_of, tube
 from vegtool.arrays import FloatArray
@@ -29,28 +32,56 @@ FUSELAGE = np.array(
 """From the nose back: share of the length, radius in metres."""
 LENGTH = 8.6
 """Metres, of the fuselage."""
+SPINNER = ((4.6, 0.36), (4.72, 0.34), (4.86, 0.27), (4.98, 0.16), (5.05, 0.07))
+"""From the fuselage on: place along it, radius, metres."""
+BLADE = (0.07, 0.13, 0.14, 0.11, 0.05)
+"""From the hub on: half the width, metres."""
 
 
-def airplane() -> Plant:
+@dataclass(frozen=True)
+class Detail:
+    """Rings and points on each, of every part."""
+
+    fuselage: tuple[int, int]
+    wing: tuple[int, int]
+    tail: tuple[int, int]
+    fin: tuple[int, int]
+    canopy: tuple[int, int]
+    spinner: tuple[int, int]
+    blade: tuple[int, int]
+
+    @property
+    def triangles(self) -> int:
+        each = {name: 2 * rings * points for name, (rings, points) in vars(self).items()}
+        return sum(each.values()) + (BLADES - 1) * each["blade"]
+
+
+BLADES = 3
+COARSE = Detail((30, 24), (17, 16), (9, 12), (6, 12), (8, 16), (5, 12), (5, 8))
+"""2,960 triangles."""
+FINE = Detail((78, 64), (51, 46), (29, 32), (19, 32), (26, 44), (15, 31), (14, 22))
+"""22,814 triangles."""
+
+
+def airplane(detail: Detail = COARSE) -> Plant:
     """9.5 m long, 11 m wide; it flies along x, y is up."""
     return plant_of(
         "airplane",
         [
-            fuselage(rings=30, columns=24),
+            fuselage(*detail.fuselage),
             wing(
                 [(-5.5, 3.9, 0.75, 0.42), (-5.2, 3.75, 1.1, 0.4), (0.0, 3.0, 2.4, 0.0),
                  (5.2, 3.75, 1.1, 0.4), (5.5, 3.9, 0.75, 0.42)],
-                height=-0.35, thick=0.13, rings=17, points=16,
+                -0.35, 0.13, *detail.wing,
             ),
             wing(
                 [(-1.9, 8.05, 0.55, 0.0), (0.0, 7.6, 1.15, 0.0), (1.9, 8.05, 0.55, 0.0)],
-                height=0.12, thick=0.1, rings=9, points=12,
+                0.12, 0.1, *detail.tail,
             ),
-            fin(),
-            ellipsoid((4.6 - 3.3, 0.52, 0.0), (1.25, 0.42, 0.33), 8, 16, GLASS),
-            tube([(4.55, 0, 0), (4.6, 0, 0), (4.72, 0, 0), (4.86, 0, 0), (4.98, 0, 0),
-                  (5.05, 0, 0), (5.07, 0, 0)], [0.36, 0.34, 0.27, 0.16, 0.07], 12, PAINT),
-            *(blade(2 * np.pi * n / 3) for n in range(3)),
+            fin(*detail.fin),
+            ellipsoid((4.6 - 3.3, 0.52, 0.0), (1.25, 0.42, 0.33), *detail.canopy, GLASS),
+            spinner(*detail.spinner),
+            *(blade(2 * np.pi * n / BLADES, *detail.blade) for n in range(BLADES)),
         ],
         COLORS,
         crease=40.0,
@@ -64,6 +95,21 @@ def fuselage(rings: int, columns: int) -> Piece:
     at = 4.6 - LENGTH * np.concatenate([[0.0], share, [1.0]])
     path = np.stack([at, np.zeros_like(at), np.zeros_like(at)], axis=1)
     return tube(path, radius, columns, METAL, flat=0.82)
+
+
+def spinner(rings: int, columns: int) -> Piece:
+    """Of the propeller, round."""
+    share = np.linspace(0.0, 1.0, rings)
+    along = smooth(share, SPINNER)
+    path = np.zeros((rings + 2, 3))
+    path[:, 0] = [4.55, *along[:, 0], 5.07]
+    return tube(path, along[:, 1], columns, PAINT)
+
+
+def smooth(share: FloatArray, through: npt.ArrayLike) -> FloatArray:
+    """At shares of the way, on a curve through evenly numbered places."""
+    places = np.asarray(through, dtype=np.float64)
+    return PchipInterpolator(np.linspace(0.0, 1.0, len(places)), places)(share)
 
 
 def section(points: int) -> FloatArray:
@@ -92,23 +138,23 @@ def wing(
     return _closed(np.stack([x, y, np.broadcast_to(across[:, None], x.shape)], axis=-1), WING)
 
 
-def fin() -> Piece:
+def fin(rings: int, points: int) -> Piece:
     """Upright at the tail."""
-    up = np.linspace(0.0, 1.0, 6)
+    up = np.linspace(0.0, 1.0, rings)
     lead, chord = 7.2 + 0.75 * up, 1.45 - 0.85 * up
-    along, side = section(12).T
+    along, side = section(points).T
     x = 4.6 - (lead[:, None] + chord[:, None] * along)
     z = -0.055 * chord[:, None] * side
     y = np.broadcast_to(0.05 + 1.35 * up[:, None], x.shape)
     return _closed(np.stack([x, y, z], axis=-1), PAINT)
 
 
-def blade(turn: float) -> Piece:
+def blade(turn: float, rings: int, points: int) -> Piece:
     """Of the propeller, twisted."""
-    out = np.linspace(0.15, 1.55, 5)
-    half = np.array([0.07, 0.13, 0.14, 0.11, 0.05])
-    pitch = np.radians(np.linspace(60.0, 20.0, 5))
-    around = 2 * np.pi * np.arange(8) / 8
+    out = np.linspace(0.15, 1.55, rings)
+    half = smooth(np.linspace(0.0, 1.0, rings), BLADE)
+    pitch = np.radians(np.linspace(60.0, 20.0, rings))
+    around = 2 * np.pi * np.arange(points) / points
     wide, thin = half[:, None] * np.cos(around), 0.2 * half[:, None] * np.sin(around)
     across = np.cos(pitch)[:, None] * wide - np.sin(pitch)[:, None] * thin
     x = 4.72 + np.sin(pitch)[:, None] * wide + np.cos(pitch)[:, None] * thin
