@@ -36,6 +36,21 @@ def test_three_quarters_are_filled(count, mean):
     assert pack(sizes, 2, 8192).fill >= 0.75
 
 
+@pytest.mark.parametrize("most", [4096, 16384])
+def test_twenty_thousand_leave_little_free_and_lie_apart(most):
+    """As many small as large ones, 4 to 128 texels: the tallest come first, so the smallest close
+    what little the skyline leaves open at its end."""
+    rng = np.random.default_rng(1)
+    sizes = np.exp(rng.uniform(np.log(4), np.log(129), (20_000, 2))).astype(int)
+    packing = pack(sizes, 0, most)
+    assert packing.width <= most
+    owners = np.zeros((packing.height, packing.width), dtype=np.uint8)
+    for x, y, w, h in packing.rect:
+        owners[y : y + h, x : x + w] += 1
+    assert owners.max() == 1
+    assert owners.mean() == pytest.approx(packing.fill) and packing.fill >= 0.95
+
+
 def test_one_rectangle_takes_no_more_than_the_next_multiple_of_four():
     packing = pack(np.array([[13, 5]]), 2, 2048)
     assert (packing.width, packing.height) == (20, 12)
