@@ -41,8 +41,9 @@ from vegtool.gl.upload import PlantBuffers
 from vegtool.growth import sample
 from vegtool.hybrid.cloud import cloud_of
 from vegtool.hybrid.greedy import Descent, descent
-from vegtool.hybrid.level import begun, drawn_as, kept_to
+from vegtool.hybrid.level import drawn_as, hybrid_level
 from vegtool.hybrid.options import Budget, Weights
+from vegtool.hybrid.start import begun
 from vegtool.lod import Display, Level
 from vegtool.measure.background import bytes_over
 from vegtool.measure.chain import views_of
@@ -154,7 +155,7 @@ def beside(case: Case, plant: Plant, missed: list[str]) -> tuple[list[dict[str, 
         rows.append(told(on.row(case.name, "mesh", mesh, perf_counter() - began)))
         began = perf_counter()
         budget = Budget(mesh.triangles, start.terms.fill)
-        hybrid = kept_to(on.source, Wanted(0, on.near_m), start, budget)
+        hybrid = hybrid_level(on.source, Wanted(mesh.triangles, on.near_m), budget)
         rows.append(told(on.row(case.name, "hybrid", hybrid, perf_counter() - began)))
         of_cloud, of_mesh, of_hybrid = rows
         for key, other in (("triangles", of_mesh), ("fragments", of_cloud), ("texels", of_cloud)):

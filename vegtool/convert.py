@@ -387,6 +387,7 @@ def level_maker(
         lit = BakedLight(under.light, under.shadows)
     if options.refine == "none":
         return partial(billboard_level, buffers, options, lit)
+    from vegtool.hybrid.or_refined import refined_or_hybrid
     from vegtool.refine.level import Wanted, refined_level, source_of
 
     source = source_of(buffers, truth_at, lit)
@@ -398,7 +399,7 @@ def level_maker(
         balance = not casts and not options.crown_normals  # which it would bend back
         textured = options.refine != "opaque"
         wanted = Wanted(most, near_m, options.max_texture, options.seed, balance, textured)
-        return refined_level(source, wanted, progress)
+        return (refined_level if casts else refined_or_hybrid)(source, wanted, progress)
 
     return make
 

@@ -10,3 +10,8 @@ Progress = Callable[[str, float], None]
 
 def silent(stage: str, fraction: float) -> None:
     """The default: report nothing."""
+
+
+def part_of(progress: Progress, before: float, share: float) -> Progress:
+    """What reports a part: so much is done before it, and so large it is, of 0 to 1."""
+    return lambda stage, fraction: progress(stage, before + share * fraction)

@@ -5,7 +5,7 @@ import subprocess
 import sys
 
 import pytest
-from baseline_cases import cards
+from surfaces import cards
 
 from vegtool.baselines import BASELINES, baseline
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from baseline_cases import plant_from, together
+from surfaces import plant_from, together
 
 from vegtool.baselines.crossed import TEXELS, crossed
 from vegtool.plant import Material, Plant

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from baseline_cases import cards
+from surfaces import cards
 
 from vegtool.baselines import baseline
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from baseline_cases import plant_from, sphere
+from surfaces import plant_from, sphere
 
 from vegtool.arrays import unit
 from vegtool.baselines.octahedral import FRAMES, Octahedral, directions, nearest

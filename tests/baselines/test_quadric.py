@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from baseline_cases import cards, plant_from, sphere, together, tube
+from surfaces import cards, plant_from, sphere, together, tube
 
 from vegtool.baselines.quadric import quadric, shares
 from vegtool.baselines.thinning import GROWTH

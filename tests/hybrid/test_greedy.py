@@ -25,7 +25,7 @@ from hybrid_cases import (
 from vegtool.hybrid.cloud import Cloud, cloud_of
 from vegtool.hybrid.cost import Weights
 from vegtool.hybrid.greedy import Descent, Step, descent
-from vegtool.hybrid.level import begun
+from vegtool.hybrid.start import begun
 from vegtool.plant import Plant
 
 TRIANGLE = mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])

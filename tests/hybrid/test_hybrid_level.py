@@ -14,9 +14,11 @@ from vegtool.formats import read_plant
 from vegtool.formats.gltf import write_chain
 from vegtool.gl.upload import PlantBuffers
 from vegtool.hybrid.charts import cones, neighbours
-from vegtool.hybrid.level import begun, cloud_of, drawn_as
+from vegtool.hybrid.cloud import cloud_of
+from vegtool.hybrid.level import drawn_as
 from vegtool.hybrid.mesh import colored
 from vegtool.hybrid.options import Budget, Weights
+from vegtool.hybrid.start import begun
 from vegtool.lod import Display, Level, LodChain, level_triangles
 from vegtool.measure.chain import views_of
 from vegtool.measure.options import MeasureOptions

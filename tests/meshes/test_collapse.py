@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from baseline_cases import grid_faces, plant_from
+from surfaces import grid_faces, plant_from
 
 from vegtool.meshes.collapse import Collapsed, carried, edges_collapsed, uncollapsed
 from vegtool.meshes.pieces import Surface, all_welded, pieces, welded

@@ -3,7 +3,9 @@
 The least error with no more than so many triangles and fragments is a least cost whose weights are
 Lagrange multipliers (Everett 1963, "Generalized Lagrange multiplier method"): the weight of
 polygons is found by bisection for a weight of fill, and that of fill, where there is a limit to it,
-by bisection around that.
+by bisection around that. A weight may leave a gap (a little less of it, and all leaves are
+triangles; a little more, and none are left), so what counts is not only where descents end: of all
+the steps that they take, the best is kept.
 """
 
 from __future__ import annotations
@@ -14,10 +16,8 @@ from vegtool.progress import Progress, silent
 
 LEAST, MOST = 1e-3, 1e3
 """Weights of polygons, of an error of 1, between which they are sought."""
-FILL = Weights().fill
-"""Weight of fill where there is no limit to it."""
 LEAST_FILL, MOST_FILL = 1e-3, 1e2
-"""Between which it is sought, where there is one."""
+"""Weights of fill, of an error of 1: of no limit to it; and between which it is sought."""
 HALVINGS, FILL_HALVINGS = 10, 6
 """Of the ratios: to 1.4 % and to 20 %."""
 
@@ -28,43 +28,60 @@ def within(
     """The hybrid of the least error that keeps to a budget, as far as one does: else of those that
     have the fewest triangles, that which fills least. start: tells the model and its cloud alone.
     cheap: as the poster."""
-    if budget.fill is None:
-        return _for_polygons(start, budget.triangles, FILL, cheap, progress)
-    best = _for_polygons(start, budget.triangles, LEAST_FILL, cheap, progress)
-    if best.terms.fill <= budget.fill:
-        return best
+    tried = Tried(start, budget, cheap)
+    if tried.at_fill(LEAST_FILL, progress) or budget.fill is None:
+        return tried.best
     low, high = LEAST_FILL, MOST_FILL
-    best = _for_polygons(start, budget.triangles, high, cheap, progress)
-    for nth in range(FILL_HALVINGS):
-        progress("budget", nth / FILL_HALVINGS)
-        middle = (low * high) ** 0.5
-        found = _for_polygons(start, budget.triangles, middle, cheap, progress)
-        if found.terms.fill <= budget.fill:
-            high, best = middle, found
-        else:
-            low = middle
-    return best
+    if tried.at_fill(high, progress):
+        for _ in range(FILL_HALVINGS):
+            middle = (low * high) ** 0.5
+            if tried.at_fill(middle, progress):
+                high = middle
+            else:
+                low = middle
+    return tried.best
 
 
-def _for_polygons(
-    start: Descent, triangles: int, fill: float, cheap: bool, progress: Progress
-) -> Descent:
-    def ended(polygons: float) -> Descent:
-        now = start.again(Weights(1.0, polygons, fill))
-        for _ in descent(now, cheap):
-            pass
+def least_fill(start: Descent) -> float:
+    """Of the billboards of what may not leave them: the fill that no hybrid goes below."""
+    stays = (pairs[~start.solid[start.cloud.face[pairs]]] for pairs in start.pairs)
+    return sum(start.billboard(pairs).fill for pairs in stays)
+
+
+class Tried:
+    """Descents that were made, and the best hybrid on their way."""
+
+    def __init__(self, start: Descent, budget: Budget, cheap: bool) -> None:
+        self.start, self.budget, self.cheap = start, budget, cheap
+        self.best = start.again(start.weights)
+
+    def at_fill(self, fill: float, progress: Progress = silent) -> bool:
+        """Seek the least weight of polygons that keeps to the triangles, at a weight of fill;
+        whether that keeps to the fill too."""
+        now = self.ended(Weights(1.0, LEAST, fill))
+        low, high = LEAST, MOST
+        if now.triangles > self.budget.triangles:
+            now = self.ended(Weights(1.0, MOST, fill))
+            for nth in range(HALVINGS):
+                progress("weights", nth / HALVINGS)
+                middle = (low * high) ** 0.5
+                found = self.ended(Weights(1.0, middle, fill))
+                if found.triangles <= self.budget.triangles:
+                    high, now = middle, found
+                else:
+                    low = middle
+        return self.budget.fill is None or now.terms.fill <= self.budget.fill
+
+    def ended(self, weights: Weights) -> Descent:
+        """What a descent comes to."""
+        now = self.start.again(weights)
+        for _ in descent(now, self.cheap):
+            if self.merit(now) < self.merit(self.best):
+                self.best = now.copy()
         return now
 
-    best = ended(LEAST)
-    if best.triangles <= triangles:
-        return best
-    low, high, best = LEAST, MOST, ended(MOST)
-    for nth in range(HALVINGS):
-        progress("weights", nth / HALVINGS)
-        middle = (low * high) ** 0.5
-        found = ended(middle)
-        if found.triangles <= triangles:
-            high, best = middle, found
-        else:
-            low = middle
-    return best
+    def merit(self, one: Descent) -> tuple[float, float, float]:
+        """Less is better: triangles over the budget, fill over it, error."""
+        fill = self.budget.fill
+        over = 0.0 if fill is None else max(0.0, one.terms.fill - fill)
+        return max(0, one.triangles - self.budget.triangles), over, one.terms.error

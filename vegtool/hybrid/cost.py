@@ -20,7 +20,7 @@ DISPLACED = 0.5
 """What costs a surface that is drawn as far from its place as a plane may move it, if one that is
 not shown costs 1; so does one twice as far away."""
 PER_BILLBOARD = 2
-"""Triangles."""
+"""Triangles; twice as many where its sides differ."""
 
 
 @dataclass(frozen=True)

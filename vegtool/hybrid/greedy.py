@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Iterator
+from copy import copy
 from dataclasses import dataclass
 from itertools import pairwise
 from time import perf_counter
@@ -85,12 +86,14 @@ class Descent:
         welded: Surface,
         extents: FloatArray,
         weights: Weights,
+        per_billboard: int = PER_BILLBOARD,
         known: dict[bytes, Reductions] | None = None,
     ) -> None:
         """welded: all faces, (f, 3), by places that they share. extents: (q, 4) radii, least and
-        greatest along the two sides of the billboard, of each pair's face. known: reductions that
-        were made before, to which others are added."""
+        greatest along the two sides of the billboard, of each pair's face. per_billboard: its
+        triangles. known: reductions that were made before, to which others are added."""
         self.cloud, self.welded, self.extents, self.weights = cloud, welded, extents, weights
+        self.per_billboard = per_billboard
         count = len(cloud.plant.faces)
         self.total = float(welded.areas.sum()) or 1.0
         self.wrong = cloud.wrong * welded.areas / self.total
@@ -113,13 +116,22 @@ class Descent:
 
     def again(self, weights: Weights) -> Descent:
         """From the start, with other weights; what is known stays so."""
-        return Descent(self.cloud, self.welded, self.extents, weights, self.known)
+        return Descent(
+            self.cloud, self.welded, self.extents, weights, self.per_billboard, self.known
+        )
+
+    def copy(self) -> Descent:
+        """As it is now: what further steps change is its own."""
+        made = copy(self)
+        made.pairs, made.board, made.parts = list(self.pairs), list(self.board), dict(self.parts)
+        made.part_of, made.place_part = self.part_of.copy(), self.place_part.copy()
+        return made
 
     @property
     def triangles(self) -> int:
         """Of billboards and mesh."""
         boards = sum(1 for pairs in self.pairs if len(pairs))
-        return PER_BILLBOARD * boards + sum(len(p.surface.faces) for p in self.parts.values())
+        return self.per_billboard * boards + sum(len(p.surface.faces) for p in self.parts.values())
 
     @property
     def in_mesh(self) -> np.ndarray:
@@ -133,7 +145,7 @@ class Descent:
         low = self.extents[pairs, 0::2].min(axis=0)
         high = self.extents[pairs, 1::2].max(axis=0)
         area = float(np.prod(high - low))
-        return Terms(0.0, PER_BILLBOARD / len(self.part_of), area / self.total)
+        return Terms(0.0, self.per_billboard / len(self.part_of), area / self.total)
 
     @property
     def sources(self) -> int:
@@ -219,16 +231,16 @@ class Descent:
         return Part(faces, found.surfaces[best], found.became[best], terms[best])
 
     def reduced(self, faces: Labels) -> Reductions:
-        """The reductions of a part, each made once. Borders stay, or else a trunk would be without
-        its foot; those of what is SMALL may move where nothing else shares them, since many a leaf
-        is all border."""
+        """The reductions of a part, each made once. Borders stay while they can, or else a trunk
+        would be without its foot; they move where nothing else shares them, and at once where they
+        are of what is SMALL, since many a leaf is all border."""
         key = faces.tobytes()
         if key not in self.known:
             surface = self.surface(faces)
             places, uses = np.unique(surface.faces, return_counts=True)
             complete = bool((self.uses[places] == uses).all())
             small = bool(np.bincount(pieces(surface.faces)[1]).max() < SMALL)
-            borders = not (small and complete)
+            borders = ((True, False), (False,))[small] if complete else (True,)
             self.known[key] = reductions(surface, self.cloud.reach, borders)
         return self.known[key]
 

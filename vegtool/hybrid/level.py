@@ -11,15 +11,16 @@ from vegtool.baking.options import BakeOptions
 from vegtool.boxes import geometric_error
 from vegtool.hybrid.budget import within
 from vegtool.hybrid.charts import charted
-from vegtool.hybrid.cloud import Cloud, cloud_of
-from vegtool.hybrid.cost import PER_BILLBOARD
+from vegtool.hybrid.cloud import Cloud
 from vegtool.hybrid.greedy import Descent, descent
 from vegtool.hybrid.mesh import colored
 from vegtool.hybrid.options import Budget, Weights
+from vegtool.hybrid.patches import patched
+from vegtool.hybrid.start import begun, started
 from vegtool.lod import Charts, Level
-from vegtool.meshes.pieces import all_welded
+from vegtool.measure.scores import scores
 from vegtool.plant import Plant
-from vegtool.progress import Progress, silent
+from vegtool.progress import Progress, part_of, silent
 from vegtool.refine.color import unbiased_color
 from vegtool.refine.level import Source, Wanted, as_measured
 from vegtool.refine.mesh import joined
@@ -28,18 +29,11 @@ from vegtool.timing import timed
 
 TRIES = 4
 """At a level of no more triangles than are allowed."""
-STARTS_WITH = 0.5
-"""Of the triangles that a budget allows: billboards. What they leave is for the mesh."""
-
-
-def begun(cloud: Cloud, weights: Weights) -> Descent:
-    """A hybrid that is all billboards."""
-    plant = cloud.plant
-    about = cloud.billboards()
-    corners = (cloud.shown.corners - plant.center) / (plant.radius or 1.0)
-    sides = [np.einsum("qci,qi->qc", corners, side[cloud.plane]) for side in (about.u, about.v)]
-    ends = [end for side in sides for end in (side.min(axis=1), side.max(axis=1))]
-    return Descent(cloud, all_welded(plant), np.stack(ends, axis=1), weights)
+FURTHER = 2
+"""Planes that patch cracks."""
+PATCHED = 0.9
+"""Of what a hybrid errs: no more than that may one whose cracks are patched, or it is not worth its
+fill."""
 
 
 def hybrid_level(
@@ -47,41 +41,53 @@ def hybrid_level(
     progress: Progress = silent,
 ) -> Level:  # fmt: skip
     """A level of a plant that starts as billboards of half of the triangles that are wanted, or all
-    of them where weights are the aim. cheap: as the poster (greedy.py)."""
+    of them where weights are the aim. cheap: as the poster (greedy.py).
+
+    Where alpha cuts nothing out, another is made of a cloud whose cracks are patched, and taken if
+    that errs so much less (FLIP) at the nearest distance as it fills more.
+    """
     seconds: dict[str, float] = {}
-    share = 1.0 if isinstance(aim, Weights) else STARTS_WITH
-    count = max(1, int(share * wanted.triangles / PER_BILLBOARD))
     with timed(seconds, "cloud"):
-        cloud = cloud_of(source.plant, count, lambda stage, f: progress(stage, 0.3 * f))
-    start = begun(cloud, aim if isinstance(aim, Weights) else Weights())
-    report = _part_of(progress, 0.3, 0.7)
-    if isinstance(aim, Budget):
-        level = kept_to(source, wanted, start, aim, cheap, report)
-    else:
-        for _ in descent(start, cheap, report):
-            pass
-        level = drawn_as(source, wanted, start, report)
+        start = started(source, wanted.triangles, aim, part_of(progress, 0.0, 0.3))
+    whole = not any(m.alpha_mode == "mask" for m in source.plant.materials)
+    report = part_of(progress, 0.3, 0.3 if whole else 0.7)
+    level = descended(source, wanted, start, aim, cheap, report)
+    if whole and level.billboards is not None and len(level.billboards):
+        with timed(seconds, "patches"):
+            more = begun(patched(start.cloud, FURTHER), start.weights, start.per_billboard)
+        other = descended(source, wanted, more, aim, cheap, part_of(progress, 0.6, 0.4))
+        true = source.truth_at(wanted.near_m)
+        errs = [float(scores(true, one).values["flip"].mean()) for one in (level, other)]
+        level = other if errs[1] < PATCHED * errs[0] else level
     return replace(level, seconds={**seconds, **level.seconds})
+
+
+def descended(
+    source: Source, wanted: Wanted, start: Descent, aim: Weights | Budget, cheap: bool = False,
+    progress: Progress = silent,
+) -> Level:  # fmt: skip
+    """The level that a start comes to."""
+    if isinstance(aim, Budget):
+        return kept_to(source, wanted, start, aim, cheap, progress)
+    for _ in descent(start, cheap, progress):
+        pass
+    return drawn_as(source, wanted, start, progress)
 
 
 def kept_to(
     source: Source, wanted: Wanted, start: Descent, budget: Budget, cheap: bool = False,
     progress: Progress = silent,
 ) -> Level:  # fmt: skip
-    """The level of the least error that a budget allows. Billboards whose sides differ stand in the
-    file twice, which is seen when they are drawn: then less is tried."""
+    """The level of the least error that a budget allows. A mesh that is seen from both sides stands
+    in the file twice where billboards do: then less is tried."""
     most = budget.triangles
     for _ in range(TRIES):
         found = within(start, replace(budget, triangles=most), cheap, progress)
         level = drawn_as(source, wanted, found, progress)
         if level.triangles <= budget.triangles:
             break
-        most = max(PER_BILLBOARD, most - (level.triangles - budget.triangles))
+        most = max(start.per_billboard, most - (level.triangles - budget.triangles))
     return level
-
-
-def _part_of(progress: Progress, before: float, share: float) -> Progress:
-    return lambda stage, fraction: progress(stage, before + share * fraction)
 
 
 def drawn_as(source: Source, wanted: Wanted, found: Descent, progress: Progress = silent) -> Level:

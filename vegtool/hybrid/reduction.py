@@ -7,6 +7,7 @@ its place; area that is lost is not shown.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -49,20 +50,22 @@ class Reductions:
         return np.array([one.areas.sum() for one in self.surfaces])
 
 
-def reductions(surface: Surface, reach: float, borders: bool) -> Reductions:
+def reductions(surface: Surface, reach: float, borders: Sequence[bool]) -> Reductions:
     """Of a surface, down to FEWEST triangles or where no edge may go. borders: whether open ones
-    stay."""
+    stay; after what that comes to, what comes next."""
     surfaces, became, wrong = [surface], [surface.faces], [0.0]
-    target, whole = len(surface.faces) / RATIO, float(surface.areas.sum())
-    while target >= FEWEST:
-        made = collapsed(surface, int(target), borders)
-        if not 0 < len(made.faces) < len(surfaces[-1].faces):
-            break
-        surfaces.append(carried(surface, made))
-        became.append(made.vertex)
-        lost = max(0.0, whole - float(surfaces[-1].areas.sum()))
-        wrong.append(min(displaced(surface, made, reach) + lost, whole))
-        target = min(target, len(made.faces)) / RATIO
+    whole = float(surface.areas.sum())
+    for stay in borders:
+        target = len(surfaces[-1].faces) / RATIO
+        while target >= FEWEST:
+            made = collapsed(surface, int(target), stay)
+            if not 0 < len(made.faces) < len(surfaces[-1].faces):
+                break
+            surfaces.append(carried(surface, made))
+            became.append(made.vertex)
+            lost = max(0.0, whole - float(surfaces[-1].areas.sum()))
+            wrong.append(min(displaced(surface, made, reach) + lost, whole))
+            target = min(target, len(made.faces)) / RATIO
     return Reductions(tuple(surfaces), tuple(became), np.array(wrong))
 
 
@@ -72,7 +75,7 @@ def collapsed(surface: Surface, target: int, borders: bool) -> Collapsed:
     rounding."""
     used, first, local = np.unique(surface.faces, return_index=True, return_inverse=True)
     faces = local.reshape(-1, 3).astype(np.int32)
-    size = float(surface.areas.sum()) ** 0.5 or 1.0
+    size = size_of(surface) or 1.0
     exact = surface.positions[used]
     noise = generator(0, "hybrid", "rough").uniform(-ROUGH, ROUGH, surface.faces.size)[first]
     rough = exact / size + noise[:, None] * outward(exact / size, faces)
@@ -94,7 +97,8 @@ def outward(positions: FloatArray, faces: IntArray) -> FloatArray:
 
 
 def displaced(surface: Surface, made: Collapsed, reach: float) -> float:
-    """Squared radii of a surface, by what their displacement costs."""
+    """Squared radii of a surface, by what their displacement costs; at open borders, what is
+    missing where they move."""
     used, first, local = np.unique(surface.faces, return_index=True, return_inverse=True)
     weight = np.bincount(local.ravel(), np.repeat(surface.areas / 3, 3), len(used))
     became = made.vertex.ravel()[first]
@@ -109,4 +113,23 @@ def displaced(surface: Surface, made: Collapsed, reach: float) -> float:
     away = to_triangles(surface.positions[used][row], made.positions[made.faces[triangle]])
     least = np.full(len(used), np.inf)
     np.minimum.at(least, row, away)
-    return float(weight @ misplaced(least, reach))
+    faces = local.reshape(-1, 3).astype(np.int32)
+    border = border_lengths(faces, surface.positions[used])
+    missing = border @ np.minimum(least, size_of(surface))
+    return float(weight @ misplaced(least, reach) + missing)
+
+
+def border_lengths(faces: IntArray, positions: FloatArray) -> FloatArray:
+    """(w,) half of the lengths of the open edges that meet in each vertex: where these move, so
+    much surface is missing, or too much, for each unit of length."""
+    edges = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
+    edge, uses = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
+    edge = edge[uses == 1]
+    length = np.linalg.norm(positions[edge[:, 0]] - positions[edge[:, 1]], axis=1)
+    half = np.repeat(length / 2, 2)
+    return np.asarray(np.bincount(edge.ravel(), half, len(positions)), dtype=np.float64)
+
+
+def size_of(surface: Surface) -> float:
+    """Radii: root of its area."""
+    return float(np.sqrt(surface.areas.sum()))
