@@ -13,8 +13,8 @@ The cost is a sum over billboards and over connected parts of the mesh, so that 
 of its terms, and most proposals stay as they are. They wait in order of what they save, and are
 looked at again when their turn comes (lazy evaluation; Minoux 1978).
 
-The poster's form looks at the billboard alone that costs most, of those that show what may leave,
-and stops where that saves nothing.
+The poster's form looks at the billboard that costs most alone, then, where that saves nothing, at
+the next, until none is left.
 """
 
 from __future__ import annotations
@@ -298,20 +298,22 @@ def descent(start: Descent, cheap: bool = False, progress: Progress = silent) ->
 
 
 def _costliest(start: Descent, began: float) -> Iterator[Step]:
-    while True:
+    """One step after the other, each of the costliest billboard that any is for. A billboard for
+    which there was none is not looked at again."""
+    asked = [bool(len(start.shown_by(plane))) for plane in range(len(start.pairs))]
+    while any(asked):
         costs = [
             board.cost(start.weights)
             + start.weights.error * float(start.wrong[start.cloud.face[pairs]].sum())
-            if len(start.shown_by(plane))
-            else -1.0
-            for plane, (board, pairs) in enumerate(zip(start.board, start.pairs, strict=True))
+            for board, pairs in zip(start.board, start.pairs, strict=True)
         ]
-        offers = list(start.proposals(int(np.argmax(costs))))
-        if not offers:
-            return
-        best = min(offers, key=lambda one: one.change.cost(start.weights))
-        if best.change.cost(start.weights) >= -LEAST * start.terms.cost(start.weights):
-            return
+        plane = max(np.flatnonzero(asked).tolist(), key=costs.__getitem__)
+        offers = list(start.proposals(plane))
+        saves = LEAST * start.terms.cost(start.weights)
+        best = min(offers, key=lambda one: one.change.cost(start.weights), default=None)
+        if best is None or best.change.cost(start.weights) >= -saves:
+            asked[plane] = False
+            continue
         start.accept(best)
         yield _step(start, began)
 

@@ -14,6 +14,7 @@ from vegtool.options import option, same_option
 
 FAMILIES: Mapping[str, ConvertOptions] = {
     "refined": ConvertOptions(),
+    "hybrid": ConvertOptions(method="hybrid"),
     **{method: ConvertOptions(refine="none", method=method) for method in METHODS},
 }
 """What is compared, and by which options `convert` makes it."""

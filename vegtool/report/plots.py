@@ -37,9 +37,11 @@ IN_PAGE = {INK: "var(--ink)", FAINT: "var(--faint)", LINE: "var(--line)", PAPER:
 DASHED = (0, (4, 3))
 LOOKS: dict[str, tuple[str, str]] = {
     "refined": ("#8250c4", "p"),
+    "hybrid": ("#8a1538", "h"),
     "branches": ("#009e73", "o"),
     "isodata": ("#0072b2", "s"),
     "kmeans": ("#e69f00", "^"),
+    "planes": ("#7a7a00", "*"),
     "live": (INK, "_"),
     "quadric": ("#cc79a7", "D"),
     "gltfpack": ("#d55e00", "v"),
