@@ -108,8 +108,8 @@ class ConvertOptions:
     )
     proposals: str = option(
         "all",
-        "What is looked at for each step of a hybrid: all billboards, or the costliest alone, which "
-        "is faster and ends a little dearer.",
+        "What is looked at for each step of a hybrid: all billboards, or the costliest alone: that "
+        "is faster, and ends a little dearer.",
         choices=("all", "costliest"),
     )
     billboards: int = option(

@@ -36,7 +36,7 @@ def borders(of: Surface) -> np.ndarray:
 def test_open_borders_stay_exactly(sides: int, turned: bool) -> None:
     """What is beyond them is drawn by others."""
     whole = surface(tube((0.3, 0, 0), 0.15, 2.0, sides, 10), turned)
-    made = reductions(whole, 0.05, (True,))
+    made = reductions(whole, 0.05, ("stay",))
     assert len(made.surfaces) > 3
     for one in made.surfaces:
         assert np.array_equal(borders(one), borders(whole))
@@ -46,7 +46,7 @@ def test_open_borders_stay_exactly(sides: int, turned: bool) -> None:
 def test_flat_sides_cost_nothing_however_they_lie(turned: bool) -> None:
     """A square tube of ten rings: the rings between its ends may go, and 8 triangles be left of
     each side but for those at the borders."""
-    made = reductions(surface(tube((0, 0, 0), 0.15, 2.0, 4, 10), turned), 0.05, (True,))
+    made = reductions(surface(tube((0, 0, 0), 0.15, 2.0, 4, 10), turned), 0.05, ("stay",))
     flat = made.triangles <= 20
     assert flat.any()
     area = made.area[0]
@@ -63,7 +63,7 @@ def test_what_has_become_of_corners_is_what_is_drawn(plant: Plant) -> None:
     from none to all of the surface."""
     whole = surface(plant)
     before = whole.positions.copy()
-    made = reductions(whole, 0.05, (True,))
+    made = reductions(whole, 0.05, ("stay",))
     assert made.surfaces[0] is whole
     assert made.wrong[0] == 0
     assert all(a > b >= 1 for a, b in pairwise(made.triangles))
@@ -80,7 +80,7 @@ def test_a_ball_shrinks_no_further_than_its_error_says() -> None:
     """Inscribed in the unit sphere, or about it: what is drawn is within the mean displacement."""
     whole = surface(ball(rows=12, columns=18))
     reach = 1.0
-    made = reductions(whole, reach, (True,))
+    made = reductions(whole, reach, ("stay",))
     radius = np.linalg.norm(whole.positions[0])
     for one, wrong in zip(made.surfaces, made.wrong, strict=True):
         if len(one.faces) < 40:
@@ -96,16 +96,16 @@ def test_faces_without_area_go_first() -> None:
     """The quads at the poles of a ball have a half without area."""
     whole = surface(ball())
     assert len(whole.faces) == 108
-    made = reductions(whole, 0.05, (True,))
+    made = reductions(whole, 0.05, ("stay",))
     assert (made.triangles[1:] <= 108 - 18).all()
     points = surface(mesh(np.ones((30, 3)), np.arange(30)))
-    assert len(reductions(points, 0.05, (True,)).surfaces) == 1
+    assert len(reductions(points, 0.05, ("stay",)).surfaces) == 1
 
 
 def test_few_triangles_stay() -> None:
     square = surface(mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], grid(1, 1)))
     assert len(square.faces) <= FEWEST
-    assert reductions(square, 0.05, (True,)).triangles.tolist() == [2]
+    assert reductions(square, 0.05, ("stay",)).triangles.tolist() == [2]
 
 
 def test_what_is_misplaced() -> None:

@@ -33,7 +33,7 @@ from vegtool.clustering.features import Labels
 from vegtool.hybrid.cloud import Cloud
 from vegtool.hybrid.cost import PER_BILLBOARD, Terms
 from vegtool.hybrid.options import Weights
-from vegtool.hybrid.reduction import Reductions, reductions
+from vegtool.hybrid.reduction import Borders, Reductions, reductions
 from vegtool.meshes.pieces import Surface, pieces
 from vegtool.progress import Progress, silent
 
@@ -232,15 +232,17 @@ class Descent:
 
     def reduced(self, faces: Labels) -> Reductions:
         """The reductions of a part, each made once. Borders stay while they can, or else a trunk
-        would be without its foot; they move where nothing else shares them, and at once where they
-        are of what is SMALL, since many a leaf is all border."""
+        would be without its foot; where nothing else shares them, straight ones are reduced then.
+        Those of what is SMALL may go at once, since many a leaf is all border."""
         key = faces.tobytes()
         if key not in self.known:
             surface = self.surface(faces)
             places, uses = np.unique(surface.faces, return_counts=True)
             complete = bool((self.uses[places] == uses).all())
             small = bool(np.bincount(pieces(surface.faces)[1]).max() < SMALL)
-            borders = ((True, False), (False,))[small] if complete else (True,)
+            borders: tuple[Borders, ...] = ("stay",)
+            if complete:
+                borders = ("free",) if small else ("stay", "skirted")
             self.known[key] = reductions(surface, self.cloud.reach, borders)
         return self.known[key]
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -18,11 +19,11 @@ from vegtool.hybrid.options import Budget, Weights
 from vegtool.hybrid.patches import patched
 from vegtool.hybrid.start import begun, started
 from vegtool.lod import Charts, Level
-from vegtool.measure.scores import scores
+from vegtool.measure.scores import Truths, scores
 from vegtool.plant import Plant
 from vegtool.progress import Progress, part_of, silent
 from vegtool.refine.color import unbiased_color
-from vegtool.refine.level import Source, Wanted, as_measured
+from vegtool.refine.level import TEXTURED, Source, Wanted, as_measured
 from vegtool.refine.mesh import joined
 from vegtool.refine.planes import none
 from vegtool.timing import timed
@@ -44,59 +45,77 @@ def hybrid_level(
     of them where weights are the aim. cheap: as the poster (greedy.py).
 
     Where alpha cuts nothing out, another is made of a cloud whose cracks are patched, and taken if
-    that errs so much less (FLIP) at the nearest distance as it fills more.
+    that errs so much less (FLIP) at the nearest distance as it fills more; and one whose mesh has
+    colours alone, taken unless its pictures are worth their texels.
     """
     seconds: dict[str, float] = {}
     with timed(seconds, "cloud"):
         start = started(source, wanted.triangles, aim, part_of(progress, 0.0, 0.3))
     whole = not any(m.alpha_mode == "mask" for m in source.plant.materials)
     report = part_of(progress, 0.3, 0.3 if whole else 0.7)
-    level = descended(source, wanted, start, aim, cheap, report)
-    if whole and level.billboards is not None and len(level.billboards):
+    made = descended(source, wanted, start, aim, cheap, report)
+    if whole and made.billboards:
         with timed(seconds, "patches"):
             more = begun(patched(start.cloud, FURTHER), start.weights, start.per_billboard)
-        other = descended(source, wanted, more, aim, cheap, part_of(progress, 0.6, 0.4))
-        true = source.truth_at(wanted.near_m)
-        errs = [float(scores(true, one).values["flip"].mean()) for one in (level, other)]
-        level = other if errs[1] < PATCHED * errs[0] else level
-    return replace(level, seconds={**seconds, **level.seconds})
+        other = descended(source, wanted, more, aim, cheap, part_of(progress, 0.6, 0.3))
+        made = other if other.error < PATCHED * made.error else made
+    if whole and made.level.charts is not None:
+        plain = Made(made.found, drawn_as(source, wanted, made.found, pictured=False), made.truth)
+        made = made if made.error < TEXTURED * plain.error else plain
+    progress("hybrid", 1.0)
+    return replace(made.level, seconds={**seconds, **made.level.seconds})
+
+
+@dataclass(frozen=True, eq=False)
+class Made:
+    """A level, what it shows of a hybrid, and what it is compared with."""
+
+    found: Descent
+    level: Level
+    truth: Truths
+
+    @property
+    def billboards(self) -> int:
+        return 0 if self.level.billboards is None else len(self.level.billboards)
+
+    @cached_property
+    def error(self) -> float:
+        """FLIP."""
+        return float(scores(self.truth, self.level).values["flip"].mean())
 
 
 def descended(
     source: Source, wanted: Wanted, start: Descent, aim: Weights | Budget, cheap: bool = False,
     progress: Progress = silent,
-) -> Level:  # fmt: skip
-    """The level that a start comes to."""
-    if isinstance(aim, Budget):
-        return kept_to(source, wanted, start, aim, cheap, progress)
-    for _ in descent(start, cheap, progress):
-        pass
-    return drawn_as(source, wanted, start, progress)
-
-
-def kept_to(
-    source: Source, wanted: Wanted, start: Descent, budget: Budget, cheap: bool = False,
-    progress: Progress = silent,
-) -> Level:  # fmt: skip
-    """The level of the least error that a budget allows. A mesh that is seen from both sides stands
-    in the file twice where billboards do: then less is tried."""
-    most = budget.triangles
+) -> Made:  # fmt: skip
+    """The level that a start comes to. A mesh that is seen from both sides stands in the file twice
+    where billboards do: then less is tried, until a budget is kept to."""
+    truth = source.truth_at(wanted.near_m)
+    if isinstance(aim, Weights):
+        for _ in descent(start, cheap, progress):
+            pass
+        return Made(start, drawn_as(source, wanted, start, progress), truth)
+    most = aim.triangles
     for _ in range(TRIES):
-        found = within(start, replace(budget, triangles=most), cheap, progress)
+        found = within(start, replace(aim, triangles=most), cheap, progress)
         level = drawn_as(source, wanted, found, progress)
-        if level.triangles <= budget.triangles:
+        if level.triangles <= aim.triangles:
             break
-        most = max(start.per_billboard, most - (level.triangles - budget.triangles))
-    return level
+        most = max(start.per_billboard, most - (level.triangles - aim.triangles))
+    return Made(found, level, truth)
 
 
-def drawn_as(source: Source, wanted: Wanted, found: Descent, progress: Progress = silent) -> Level:
-    """What a descent has come to, for distances from `wanted.near_m` metres on."""
+def drawn_as(
+    source: Source, wanted: Wanted, found: Descent, progress: Progress = silent,
+    pictured: bool = True,
+) -> Level:  # fmt: skip
+    """What a descent has come to, for distances from `wanted.near_m` metres on. pictured: whether
+    its mesh has pictures; else it has colours alone."""
     seconds: dict[str, float] = {}
     plant, cloud = source.plant, found.cloud
     density = source.truth_at.display.pixels_per_metre(wanted.near_m)
     with timed(seconds, "mesh"):
-        mesh, charts, pictures = mesh_of(source, found, density)
+        mesh, charts, pictures = mesh_of(source, found, density if pictured else 0.0)
     left = np.sort(np.concatenate(found.pairs))
     labels = np.full(len(plant.faces), -1, dtype=np.int32)
     rest = cloud.of(left)
@@ -120,12 +139,14 @@ def drawn_as(source: Source, wanted: Wanted, found: Descent, progress: Progress 
 def mesh_of(
     source: Source, found: Descent, density: float
 ) -> tuple[Plant | None, Charts | None, Charted | None]:
-    """The mesh, what its faces show, and what is to be baked for that."""
+    """The mesh, what its faces show, and what is to be baked for that. density: texels per metre,
+    of which 0 are no pictures."""
     mesh, charts, pictures = colored(source.colored, found.parts.values()), None, None
     if mesh is None:
         return None, None, None
     plant = source.plant
-    apart = charted(plant, mesh, density, found.cloud.reach * plant.radius)
+    reach_m = found.cloud.reach * plant.radius
+    apart = charted(plant, mesh, density, reach_m) if density else None
     if apart is not None:
         mesh, charts, pictures = apart
     materials = np.unique(plant.face_material[found.in_mesh])

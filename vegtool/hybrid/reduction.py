@@ -9,16 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
 from vegtool.arrays import FloatArray, IntArray, unit
 from vegtool.hybrid.cost import misplaced
+from vegtool.hybrid.skirt import edges_collapsed_in_skirt, open_edges, sideways
 from vegtool.meshes.collapse import Collapsed, carried, edges_collapsed
 from vegtool.meshes.distance import to_triangles
 from vegtool.meshes.pieces import Surface
 from vegtool.seeding import generator
 
+Borders = Literal["stay", "skirted", "free"]
+"""What becomes of open ones: nothing; edges go where they are straight (skirt.py); or anything."""
 FEWEST = 4
 """Triangles: of no more, none is left out."""
 RATIO = 2**0.25
@@ -50,15 +54,15 @@ class Reductions:
         return np.array([one.areas.sum() for one in self.surfaces])
 
 
-def reductions(surface: Surface, reach: float, borders: Sequence[bool]) -> Reductions:
-    """Of a surface, down to FEWEST triangles or where no edge may go. borders: whether open ones
-    stay; after what that comes to, what comes next."""
+def reductions(surface: Surface, reach: float, borders: Sequence[Borders]) -> Reductions:
+    """Of a surface, down to FEWEST triangles or where no edge may go. borders: what becomes of open
+    ones; after what the first comes to, the next."""
     surfaces, became, wrong = [surface], [surface.faces], [0.0]
     whole = float(surface.areas.sum())
-    for stay in borders:
+    for border in borders:
         target = len(surfaces[-1].faces) / RATIO
         while target >= FEWEST:
-            made = collapsed(surface, int(target), stay)
+            made = collapsed(surface, int(target), border)
             if not 0 < len(made.faces) < len(surfaces[-1].faces):
                 break
             surfaces.append(carried(surface, made))
@@ -69,21 +73,27 @@ def reductions(surface: Surface, reach: float, borders: Sequence[bool]) -> Reduc
     return Reductions(tuple(surfaces), tuple(became), np.array(wrong))
 
 
-def collapsed(surface: Surface, target: int, borders: bool) -> Collapsed:
+def collapsed(surface: Surface, target: int, borders: Borders) -> Collapsed:
     """Edges collapsed in lengths of the surface's own size, for errors up to fixed ones go first;
     and roughly, for where a surface is flat, errors are alike everywhere and what is least is
-    rounding."""
+    rounding. To about `target` triangles."""
     used, first, local = np.unique(surface.faces, return_index=True, return_inverse=True)
     faces = local.reshape(-1, 3).astype(np.int32)
     size = size_of(surface) or 1.0
     exact = surface.positions[used]
     noise = generator(0, "hybrid", "rough").uniform(-ROUGH, ROUGH, surface.faces.size)[first]
-    rough = exact / size + noise[:, None] * outward(exact / size, faces)
-    made = edges_collapsed(Surface(rough, faces, surface.corners), target, AGGRESSIVE, borders)
+    normals = outward(exact / size, faces)
+    rough = normals if borders != "skirted" else normals + sideways(exact / size, faces, normals)
+    own = Surface(exact / size + noise[:, None] * rough, faces, surface.corners)
+    if borders == "skirted":
+        made = edges_collapsed_in_skirt(own, normals, target, AGGRESSIVE)
+    else:
+        made = edges_collapsed(own, target, AGGRESSIVE, borders == "stay")
     if not len(made.faces):
         return made
     positions = size * made.positions
-    still = (made.vertex >= 0) & (made.positions[made.vertex] == rough[faces]).all(axis=2)
+    still = made.vertex >= 0
+    still[still] = (made.positions[made.vertex[still]] == own.positions[faces[still]]).all(axis=1)
     positions[made.vertex[still]] = exact[faces[still]]
     return replace(made, positions=positions)
 
@@ -122,9 +132,7 @@ def displaced(surface: Surface, made: Collapsed, reach: float) -> float:
 def border_lengths(faces: IntArray, positions: FloatArray) -> FloatArray:
     """(w,) half of the lengths of the open edges that meet in each vertex: where these move, so
     much surface is missing, or too much, for each unit of length."""
-    edges = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
-    edge, uses = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
-    edge = edge[uses == 1]
+    edge = open_edges(faces)
     length = np.linalg.norm(positions[edge[:, 0]] - positions[edge[:, 1]], axis=1)
     half = np.repeat(length / 2, 2)
     return np.asarray(np.bincount(edge.ravel(), half, len(positions)), dtype=np.float64)

@@ -139,7 +139,9 @@ def _with_bounds(row: Row, bench: Bench, level: Level) -> Row:
 
 def _worst(bench: Bench, of: Callable[[Camera], FloatArray]) -> tuple[float | None, ...]:
     """The greatest of all billboards and views at each size; None for infinite."""
-    worst = (max(float(of(c).max(initial=0.0)) for c in cameras) for cameras in bench.truths.cameras)
+    worst = (
+        max(float(of(c).max(initial=0.0)) for c in cameras) for cameras in bench.truths.cameras
+    )
     return tuple(value if np.isfinite(value) else None for value in worst)
 
 
