@@ -110,6 +110,16 @@ def means(name: str, sitting: Sitting) -> list[str]:
     return rows
 
 
+HYBRIDS = """## Hybrids
+
+`vegtool convert figure.glb --method hybrid --weights polygons=0.03`, then 0.3, 2 and 30: from nearly a mesh to
+nearly a cloud of billboards ([how](../methods/hybrid.md)). Drawn by `python benchmarks/hybrid.py`.
+
+![A cartoon figure: the original, and hybrids of four weights](hybrid_dial.png)
+"""
+"""What benchmarks/hybrid.py draws."""
+
+
 def page(rows: Sequence[str], options: dict[str, str]) -> str:
     """docs/gallery/README.md; options: of vegtool convert, plant by plant."""
     table, columns = "\n".join(rows), ", ".join(NAMES.values())
@@ -132,7 +142,8 @@ Mean FLIP of 12 views all around, and triangles:
 {table}
 
 {sections}
-"""
+
+{HYBRIDS}"""
 
 
 def main() -> None:

@@ -1,6 +1,6 @@
 """Hybrids beside pure clouds and pure meshes: what they cost, and how far they are from the truth.
 
-    python benchmarks/hybrid.py                                    # a quarter of an hour
+    python benchmarks/hybrid.py                                    # twenty minutes
     python benchmarks/hybrid.py --plants ash=models/ash.glb        # another plant beside them
     python benchmarks/hybrid.py --record --markdown --figures docs
 
@@ -10,7 +10,9 @@ a cherry of `vegtool sample`, and a cartoon figure and an airplane made by scrip
 beside: of each model a cloud of planes, a mesh reduced to so many triangles, and a hybrid that has
 no more triangles than the mesh and makes no more fragments than the cloud. dial: the figure with
 four weights of polygons, from nearly a mesh to nearly a cloud. steps: a hybrid's cost from step to
-step, of both ways to look for proposals, with the seconds that they take.
+step, of both ways to look for proposals, with the seconds that they take. near: of models of which
+alpha cuts nothing out, the first levels of `vegtool convert` as refined ones and as hybrids, and
+whether convert looks at hybrids unasked.
 
 What is missed of what is asked is told at the end, and the exit status is then 1.
 """
@@ -22,7 +24,7 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -34,6 +36,13 @@ from solids.figure import figure
 
 from vegtool import __version__
 from vegtool.baselines.quadric import quadric
+from vegtool.convert import (
+    LEVEL_RATIO,
+    TRIANGLES_PER_BILLBOARD,
+    ConvertOptions,
+    billboard_counts,
+    near_pixels,
+)
 from vegtool.formats import read_plant
 from vegtool.formats.png import encode
 from vegtool.gl.context import describe
@@ -43,6 +52,7 @@ from vegtool.hybrid.cloud import cloud_of
 from vegtool.hybrid.greedy import Descent, descent
 from vegtool.hybrid.level import drawn_as, hybrid_level
 from vegtool.hybrid.options import Budget, Weights
+from vegtool.hybrid.or_refined import mesh_holds
 from vegtool.hybrid.start import begun
 from vegtool.lod import Display, Level
 from vegtool.measure.background import bytes_over
@@ -50,15 +60,19 @@ from vegtool.measure.chain import views_of
 from vegtool.measure.options import MeasureOptions
 from vegtool.measure.pictures import client_plant, fragments, live, truth
 from vegtool.measure.scores import TruthsAt, scores
+from vegtool.meshes.pieces import all_welded, pieces
 from vegtool.plant import Plant
-from vegtool.refine.level import Source, Wanted, source_of
+from vegtool.refine.level import Source, Wanted, refined_level, source_of
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "methods" / "hybrid.md"
 MARK = "<!-- {} made by benchmarks/hybrid.py -->"
-PARTS = ("beside", "dial", "steps")
+PARTS = ("beside", "dial", "steps", "near")
 DIAL = (0.03, 0.3, 2.0, 30.0)
 """Weights of polygons."""
+SOLID = ("statue", "height-field", "dead-tree", "grass-clump", "palm")
+"""Samples of which alpha cuts nothing out."""
+NEAR = ("what", "triangles", "billboards", "texels", "fragments", "flip", "seconds")
 STEPS = 7
 """Of a descent, that are drawn."""
 SECONDS = 30.0
@@ -135,6 +149,10 @@ def bench(plant: Plant, pixels: float) -> Iterator[Bench]:
         truth_at = TruthsAt(plant, views_of(MeasureOptions(views="all")), display, buffers)
         near_m = display.distance_m(pixels / plant.extent)
         yield Bench(plant, source_of(buffers, truth_at), truth_at, near_m)
+
+
+def uncut(plant: Plant) -> bool:
+    return all(material.alpha_mode != "mask" for material in plant.materials)
 
 
 def say(text: str) -> None:
@@ -225,6 +243,31 @@ def steps(plant: Plant, missed: list[str]) -> list[dict[str, Any]]:
     return rows
 
 
+def near(models: Sequence[Plant]) -> list[dict[str, Any]]:
+    """The first two levels of each."""
+    rows = []
+    options = ConvertOptions()
+    for plant in models:
+        counts = billboard_counts(plant, options)[:2]
+        count, _ = pieces(all_welded(plant).faces)
+        with bench(plant, near_pixels(counts[0])) as on:
+            for nth, planes in enumerate(counts):
+                at = replace(on, near_m=on.near_m * LEVEL_RATIO**nth)
+                wanted = Wanted(TRIANGLES_PER_BILLBOARD * planes, at.near_m)
+                for what in ("refined", "hybrid"):
+                    began = perf_counter()
+                    if what == "hybrid":
+                        level = hybrid_level(on.source, wanted, Budget(wanted.triangles))
+                    else:
+                        level = refined_level(on.source, wanted)
+                    row = at.row(plant.name, what, level, perf_counter() - began)
+                    unasked = "yes" if mesh_holds(plant, wanted.triangles) else "no"
+                    told_of = {"pieces": count, "for": wanted.triangles, "unasked": unasked}
+                    kept = {key: row[key] for key in NEAR}
+                    rows.append(told({"model": plant.name, **told_of, **kept}))
+    return rows
+
+
 def table(rows: Sequence[dict[str, Any]]) -> str:
     keys = list(rows[0])
     lines = [" | ".join(key.replace("_", " ") for key in keys), "|".join("---" for _ in keys)]
@@ -251,8 +294,9 @@ def main() -> int:
     cases = list(CASES)
     for word in given.plants:
         name, _, file = word.partition("=")
-        models[name] = read_plant(Path(file))
-        cases.append(Case(name, 140, 1840, 300.0))
+        models[name] = replace(read_plant(Path(file)), name=name)
+        if not uncut(models[name]):
+            cases.append(Case(name, 140, 1840, 300.0))
     missed: list[str] = []
     found: dict[str, list[dict[str, Any]]] = {}
     pictures: dict[str, np.ndarray] = {}
@@ -262,9 +306,13 @@ def main() -> int:
             rows, pictures[f"hybrid_{case.name}"] = beside(case, models[case.name], missed)
             found["beside"] += rows
     if "dial" in parts:
-        found["dial"], pictures["hybrid_dial"] = dial(models["figure"])
+        found["dial"], pictures["gallery/hybrid_dial"] = dial(models["figure"])
     if "steps" in parts:
         found["steps"] = steps(models["cherry"], missed)
+    if "near" in parts:
+        solid = [sample(name) for name in SOLID]
+        asked = [plant for name, plant in models.items() if name not in {c.name for c in CASES}]
+        found["near"] = near([*solid, *(plant for plant in asked if uncut(plant))])
     if given.record:
         machine = {"version": __version__, "renderer": describe().renderer, "cores": os.cpu_count()}
         for name, rows in found.items():
@@ -274,7 +322,9 @@ def main() -> int:
             written(PAGE, MARK.format(name), table(rows))
     if given.figures is not None:
         for name, pixels in pictures.items():
-            (given.figures / f"{name}.png").write_bytes(encode(pixels))
+            file = given.figures / f"{name}.png"
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_bytes(encode(pixels))
     for sentence in missed:
         say(f"missed: {sentence}")
     return 1 if missed else 0
