@@ -1,0 +1,2 @@
+out float covered;
+void main() { covered = 1.0; }
