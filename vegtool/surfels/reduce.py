@@ -1,0 +1,90 @@
+"""Which billboards of a hierarchy are worth their texels.
+
+Holst, Schumann: Surfel-based billboard hierarchies for fast rendering of 3D-objects (2007), section
+4.4. First go those that are no coarser than the triangles below (eq. 16), then those that are valid
+over a short range only, between what is valid before and after (eq. 17).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vegtool.arrays import FloatArray
+from vegtool.surfels.box import SurfelBoxes
+from vegtool.surfels.hierarchy import Base, SurfelHierarchy, monotone
+from vegtool.surfels.validity import distance_error
+
+DS_MAX = 1.5
+"""Mean ratio of a father's z_min to its children's, below which what is between them goes."""
+
+
+def reduced(base: Base, one: SurfelHierarchy, ds_max: float = DS_MAX) -> SurfelHierarchy:
+    """The hierarchy without what is of no use; monotone, as it was."""
+    return similar_gone(base, coarser_kept(base, one), ds_max)
+
+
+def coarser_kept(base: Base, one: SurfelHierarchy) -> SurfelHierarchy:
+    """Without billboards that are no coarser than triangles which they stand for.
+
+    Both are seen from spheres of which the billboard's contains the triangles', so that z_min (eq.
+    8, 16) is compared by error alone: for any epsilon and view.
+    """
+    needed = np.zeros(len(one))
+    patch, over = one.pairs()
+    np.maximum.at(needed, over, base.error[patch])
+    flat = distance_error(one.boxes.half[:, 2], one.theta)
+    keep = flat > needed
+    if len(one):
+        keep |= (one.father < 0) & (needed < np.inf)
+    return kept(base, one, keep)
+
+
+def similar_gone(base: Base, one: SurfelHierarchy, ds_max: float) -> SurfelHierarchy:
+    """Without billboards whose ds (eq. 17) is less than ds_max; what has no father stays, and what
+    has patches alone below, whose z_min is that of their triangles."""
+    father = one.father.tolist()
+    below: list[set[int]] = [set() for _ in father]
+    for child, above in enumerate(father):
+        if above >= 0:
+            below[above].add(child)
+    has = one.above >= 0
+    lows: list[list[float]] = [[] for _ in father]
+    for at, error in zip(one.above[has].tolist(), base.error[has].tolist(), strict=True):
+        lows[at].append(error)
+    keep = np.ones(len(one), dtype=bool)
+    for number in np.argsort(one.error, kind="stable").tolist():
+        above = father[number]
+        if above < 0:
+            continue
+        errors = np.array([one.error[child] for child in below[number]] + lows[number])
+        if similarity(float(one.error[above]), errors) >= ds_max:
+            continue
+        keep[number] = False
+        below[above].discard(number)
+        below[above] |= below[number]
+        lows[above] += lows[number]
+        for child in below[number]:
+            father[child] = above
+    return kept(base, one, keep)
+
+
+def similarity(father: float, children: FloatArray) -> float:
+    """ds (eq. 17) of what has so large a father and children; infinite over what has no error."""
+    with np.errstate(divide="ignore"):
+        return float(father * (1 / children).mean())
+
+
+def kept(base: Base, one: SurfelHierarchy, keep: np.ndarray) -> SurfelHierarchy:
+    """Some of the billboards, (b,) bool; the others' children are their fathers'."""
+    number = np.cumsum(keep).astype(np.int32) - 1
+    lowest = np.full(len(one) + 1, -1, dtype=np.int32)  # the last for what has no father
+    for at in range(len(one) - 1, -1, -1):
+        lowest[at] = number[at] if keep[at] else lowest[one.father[at]]
+    boxes = one.boxes
+    some = SurfelBoxes(boxes.center[keep], boxes.axes[keep], boxes.half[keep])
+    error = distance_error(some.half[:, 2], one.theta)
+    radius = np.linalg.norm(some.half, axis=1)
+    left = SurfelHierarchy(
+        some, lowest[one.father[keep]], error, some.center, radius, lowest[one.above], one.theta
+    )
+    return monotone(base, left)
