@@ -1,0 +1,1 @@
+"""Surfel-billboard hierarchies, and the triangles below them."""

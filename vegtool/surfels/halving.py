@@ -1,0 +1,60 @@
+"""Groups of triangles made of about half as many, all at once (collapses.py).
+
+So that one vertex does not spoil what its whole group is good for, none goes that costs much more
+than the group's median one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vegtool.arrays import FloatArray
+from vegtool.surfels.collapses import Asks, Pass
+from vegtool.surfels.sheets import Flags, Triangles, runs, together
+
+PASSES = 8
+"""Most passes in which a group is halved."""
+
+SPREAD = 1.5
+"""Times the median: the displacement of the vertex that costs most in a group."""
+
+LEAST = 2.0**-23
+"""Plant radii: a displacement that is none, as float32 does not tell it."""
+
+
+def halved(
+    triangles: Triangles, positions: FloatArray, held: Flags, limit: FloatArray
+) -> Triangles:
+    """What is left of the triangles, sorted by group.
+
+    positions: (w, 3) of the sheets' vertices, held: (w,) whether they must stay. limit: (g,) how
+    far the vertices of each group may be displaced; both in plant radii.
+    """
+    surplus = -(-np.bincount(triangles.group, minlength=len(limit)) // 4)  # each takes two along
+    done = []
+    for nth in range(PASSES):
+        if not len(triangles):
+            break
+        one = Pass(triangles, positions, held)
+        asks = one.asks()
+        if nth == 0:
+            limit = np.minimum(limit, _usual(asks, len(limit)))
+        asks = one.winners(asks.of(asks.error <= limit[asks.group] ** 2), surplus)
+        went = np.bincount(asks.group, minlength=len(limit))
+        surplus = surplus - went
+        more = (went > 0) & (surplus > 0)
+        triangles = one.without(asks)
+        done.append(triangles.of(~more[triangles.group]))
+        triangles = triangles.of(more[triangles.group])
+    left = together([*done, triangles])
+    return left.of(np.argsort(left.group, kind="stable"))
+
+
+def _usual(asks: Asks, groups: int) -> FloatArray:
+    """(g,) the displacement of the vertex that costs most, by that of the median one."""
+    order = np.lexsort((asks.error, asks.group))
+    start = runs(asks.group[order])
+    middle = start + np.diff(start, append=len(order)) // 2
+    usual = np.zeros(groups)
+    usual[asks.group[order[start]]] = SPREAD * np.sqrt(asks.error[order[middle]])
+    return np.maximum(usual, LEAST)
