@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vegtool.arrays import FloatArray, unit
-from vegtool.surfels.sheets import Flags, Labels, Triangles, edge_keys, following, runs
+from vegtool.surfels.sheets import Flags, Labels, Sheets, Triangles, edge_keys, following, runs
 
 TURN = 0.4
 """Cosine of the angle by which a triangle turns at most."""
@@ -62,10 +62,10 @@ class Pass:
     own: (v,) group of each vertex that may go, and one of its groups else.
     """
 
-    def __init__(self, triangles: Triangles, positions: FloatArray, held: Flags) -> None:
-        self.triangles = triangles
+    def __init__(self, triangles: Triangles, sheets: Sheets) -> None:
+        self.triangles, self.normals = triangles, sheets.normals
         self.used, faces = np.unique(triangles.faces, return_inverse=True)
-        self.faces, self.positions = faces.reshape(-1, 3), positions[self.used]
+        self.faces, self.positions = faces.reshape(-1, 3), sheets.positions[self.used]
         self.corner = self.faces.ravel()
         self.count = len(self.used)
         a, b, c = (self.positions[self.faces[:, i]] for i in range(3))
@@ -85,7 +85,7 @@ class Pass:
         self.edges, self.inner = key[order[start]], np.stack([one[inside], other[inside]])
         outside = np.ones(len(key), bool)
         outside[self.inner] = False
-        self.stays = held[self.used]
+        self.stays = sheets.held[self.used]
         self.stays[self.corner[outside]] = True
         self.stays[self.corner[following(np.flatnonzero(outside))]] = True
 
@@ -184,11 +184,11 @@ class Pass:
         at, which, goal = at[~falls], which[~falls], goal[~falls]
         corners, seam = (a.ravel().copy() for a in (self.triangles.corners, self.triangles.seam))
         gone, kept = asks.gone[:, which], asks.kept[:, which]
-        # on the seam's side that the corner is on; of two vertices there, the triangle's own
-        second = (seam[at] != seam[gone[0]]) | (
-            (seam[at] == seam[gone[1]]) & (corners[at] == corners[gone[1]])
-            & (corners[at] != corners[gone[0]])
-        )  # fmt: skip
+        # on the corner's side of a seam; if both are, with the normal that is most like its own
+        own = self.normals[corners[at]]
+        alike = [np.einsum("ni,ni->n", own, self.normals[corners[to]]) for to in kept]
+        second = seam[at] == seam[gone[1]]
+        second &= (seam[at] != seam[gone[0]]) | (alike[1] > alike[0])
         to = np.where(second, kept[1], kept[0])
         corners[at], seam[at] = corners[to], seam[to]
         faces = self.corner.copy()

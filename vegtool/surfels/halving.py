@@ -10,7 +10,7 @@ import numpy as np
 
 from vegtool.arrays import FloatArray
 from vegtool.surfels.collapses import Asks, Pass
-from vegtool.surfels.sheets import Flags, Triangles, runs, together
+from vegtool.surfels.sheets import Sheets, Triangles, runs, together
 
 PASSES = 8
 """Most passes in which a group is halved."""
@@ -22,20 +22,17 @@ LEAST = 2.0**-23
 """Plant radii: a displacement that is none, as float32 does not tell it."""
 
 
-def halved(
-    triangles: Triangles, positions: FloatArray, held: Flags, limit: FloatArray
-) -> Triangles:
+def halved(triangles: Triangles, sheets: Sheets, limit: FloatArray) -> Triangles:
     """What is left of the triangles, sorted by group.
 
-    positions: (w, 3) of the sheets' vertices, held: (w,) whether they must stay. limit: (g,) how
-    far the vertices of each group may be displaced; both in plant radii.
+    limit: (g,) plant radii, how far the vertices of each group may be displaced.
     """
     surplus = -(-np.bincount(triangles.group, minlength=len(limit)) // 4)  # each takes two along
     done = []
     for nth in range(PASSES):
         if not len(triangles):
             break
-        one = Pass(triangles, positions, held)
+        one = Pass(triangles, sheets)
         asks = one.asks()
         if nth == 0:
             limit = np.minimum(limit, _usual(asks, len(limit)))

@@ -70,7 +70,7 @@ def clustered(size: Labels, pairs: tuple[Labels, Labels], border: FloatArray, mo
         if not len(key):
             return np.unique(label, return_inverse=True)[1]
         a, b = key >> 31, key & ((1 << 31) - 1)
-        border = np.bincount(index, border[fits])
+        border = np.asarray(np.bincount(index, border[fits]), np.float64)
         rank = np.empty(len(key), np.int64)
         rank[np.argsort(-border / (size[a] + size[b]), kind="stable")] = np.arange(len(key))
         best = np.full(len(size), len(key))

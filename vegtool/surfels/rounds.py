@@ -98,7 +98,7 @@ class Rounds:
             self._round()
 
     def _round(self) -> None:
-        positions, held = self.sheets.positions, self.sheets.held
+        positions = self.sheets.positions
         present, patch = np.unique(self.live_patch, return_inverse=True)
         group = groups_of(self.live, positions, patch)
         made_of = np.zeros(len(present), np.int64)
@@ -108,7 +108,7 @@ class Rounds:
 
         before = np.bincount(group)
         todo = self.live.regrouped(group).of((limit > bound.error)[group])
-        made = halved(todo, positions, held, limit)
+        made = halved(todo, self.sheets, limit)
         after = np.bincount(made.group, minlength=len(before))
         done = (after > 0) & (after <= FEWER * before)
         made = made.of(done[made.group])

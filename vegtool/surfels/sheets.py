@@ -37,7 +37,7 @@ class Sheets:
     positions: (w, 3) in plant radii about its center. held: (w,) bool, vertices that must stay.
     faces: (f, 3) int64 into them. whole: (f,) bool, faces with three different places; the others
     belong to no sheet. seam: (v,) int64, equal for vertices of the plant at one place that have the
-    same texture coordinates and colour.
+    same texture coordinates and colour. normals: (v, 3), the plant's.
     """
 
     positions: FloatArray
@@ -45,6 +45,7 @@ class Sheets:
     faces: Labels
     whole: Flags
     seam: Labels
+    normals: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,9 +106,8 @@ def sheets(plant: Plant) -> Sheets:
     positions[fan] = local[plant.faces.ravel()]
     held[corners[alone]] = held[corners[following(alone)]] = True
     stays[fan] = held[corners]
-    return Sheets(
-        positions, stays, fan.reshape(-1, 3).astype(np.int64), whole, _seams(plant, place)
-    )
+    faces = fan.reshape(-1, 3).astype(np.int64)
+    return Sheets(positions, stays, faces, whole, _seams(plant, place), plant.normals)
 
 
 def _joined(plant: Plant, place: Labels, whole: Flags) -> tuple[Labels, Labels, Labels]:
