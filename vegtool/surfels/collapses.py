@@ -3,9 +3,10 @@
 A vertex moves into a neighbour, and never elsewhere, so that all that is left are vertices of the
 plant with their attributes. Its error is the mean squared distance from where it goes to the planes
 of the triangles about it, by area (Garland, Heckbert: Surface simplification using quadric error
-metrics, 1997). What stays: what another group has too, what is held (sheets.py), and where seams of
-the texture meet; a vertex on a seam moves along it. Every vertex asks for its best edge, and those
-go whom no neighbour underbids.
+metrics, 1997); or how far the surface moves there, which is more at the end of a twig or where it
+bends, as all planes run along it. What stays: what another group has too, what is held (sheets.py),
+and where seams of the texture meet; a vertex on a seam moves along it. Every vertex asks for its
+best edge, and those go whom no neighbour underbids.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vegtool.arrays import FloatArray, unit
+from vegtool.meshes.distance import to_triangles
 from vegtool.surfels.sheets import Flags, Labels, Sheets, Triangles, edge_keys, following, runs
 
 TURN = 0.4
@@ -26,6 +28,9 @@ SLIVER = 1e-3
 TANGENTIAL = 1e-4
 """What moving along the surface counts, of what moving across it does, as squares: in planes the
 shortest edges go first."""
+
+EDGES = 3
+"""Of each vertex that are tried, from the cheapest on, until one may collapse."""
 
 CALLS = 2
 """How often those ask again who are not beside one that goes."""
@@ -101,10 +106,21 @@ class Pass:
             error += times * tensor[start] * way[:, i] * way[:, j]
         error = np.divide(np.maximum(error, 0), total, out=np.zeros(len(total)), where=total > 0)
         cost = error + TANGENTIAL * np.einsum("ni,ni->n", way, way)
-        edges = Asks(start, end, self.own[start], gone, kept, error, cost)
         order = np.lexsort((cost, start))
-        best = edges.of(order[runs(start[order])])
-        return best.of(self._may_collapse(best.start, best.end))
+        first = runs(start[order])
+        many = np.diff(first, append=len(order))
+        best, asking = [], np.zeros(self.count, bool)
+        for nth in range(EDGES):
+            rows = order[first[many > nth] + nth]
+            rows = rows[~asking[start[rows]]]
+            away = self._away(start[rows], end[rows])
+            rows, away = rows[away < np.inf], away[away < np.inf]
+            error[rows] = np.maximum(error[rows], away**2)
+            cost[rows] = np.maximum(cost[rows], away**2)
+            asking[start[rows]] = True
+            best.append(rows)
+        edges = Asks(start, end, self.own[start], gone, kept, error, cost)
+        return edges.of(np.sort(np.concatenate(best)))
 
     def _along_seams(self) -> tuple[Labels, Labels, Labels, Labels]:
         """(m,), (m,) both ends of the edges along which vertices may go; (2, m), (2, m) their
@@ -136,8 +152,10 @@ class Pass:
         nth = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
         return self.slots[first[which] + nth], which
 
-    def _may_collapse(self, start: Labels, end: Labels) -> Flags:
-        """(m,) whether the surface stays a surface and its triangles turn and thin but little."""
+    def _away(self, start: Labels, end: Labels) -> FloatArray:
+        """(m,) how far vertices would be from what is left around them, or the middles of its new
+        edges from what was; infinite where the surface would not stay one, or a triangle turn or
+        thin too much."""
         at, which = self._around(start)
         after = following(at)
         left, right, goal = self.corner[after], self.corner[following(after)], end[which]
@@ -146,14 +164,26 @@ class Pass:
         shared = (self.edges[found] == key) & (left != goal)
         stay = (left != goal) & (right != goal)
         fine = np.bincount(which, shared, len(start)) == 2
-        fine &= np.bincount(which, stay, len(start)) > 0
         a, b, c = (self.positions[v[stay]] for v in (goal, left, right))
+        which, face = which[stay], at[stay] // 3
         cross = np.cross(b - a, c - a)
         twice = np.linalg.norm(cross, axis=1)
         longest = np.max([np.einsum("ni,ni->n", s, s) for s in (b - a, c - a, c - b)], axis=0)
-        turned = np.einsum("ni,ni->n", cross, self.normal[at[stay] // 3]) <= TURN * twice
-        bad = turned | (twice < SLIVER * longest)
-        return np.asarray(fine & (np.bincount(which[stay], bad, len(start)) == 0))
+        turned = np.einsum("ni,ni->n", cross, self.normal[face]) <= TURN * twice
+        fine &= np.bincount(which, turned | (twice < SLIVER * longest), len(start)) == 0
+        result = np.full(len(start), np.inf)
+        rows = np.flatnonzero(fine[which])
+        corners = np.stack([a[rows], b[rows], c[rows]], axis=1)
+        off = to_triangles(self.positions[start[which[rows]]], corners)
+        np.minimum.at(result, which[rows], off)
+
+        edge = np.flatnonzero(fine[which] & ~shared[stay])
+        was, of = self._around(start[which[edge]])
+        off = to_triangles(((a + b) / 2)[edge][of], self.positions[self.faces[was // 3]])
+        back = np.full(len(edge), np.inf)
+        np.minimum.at(back, of, off)
+        np.maximum.at(result, which[edge], back)
+        return result
 
     def winners(self, asks: Asks, most: Labels) -> Asks:
         """Those that collapse: no two start side by side, nor more in a group than `most` (g,)."""

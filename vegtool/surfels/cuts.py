@@ -55,8 +55,9 @@ def coarsest(mt: MultiTriangulation) -> Flags:
 
 
 def between(mt: MultiTriangulation, applied: Flags) -> Flags:
-    """(a,) bool: the arcs from nodes that are not applied to such as are, of (n,) bool."""
-    return np.asarray(applied[mt.end] & ~applied[mt.start])
+    """(a,) bool: the arcs from nodes that are not applied to such as are, of (n,) bool. The drain
+    always is, the source never."""
+    return np.asarray((applied[mt.end] | (mt.end == 0)) & (~applied[mt.start] | coarsest(mt)))
 
 
 def triangles(mt: MultiTriangulation, cut: Flags) -> Labels:

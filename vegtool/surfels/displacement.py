@@ -32,8 +32,9 @@ BESIDE = np.array([-0.75, -0.5, -0.25, 0.25, 0.5, 0.75])
 LARGE = 0.5
 """Of the group's displacement: an edge reaches twice as far as its middle at most."""
 
-MARGIN = 1.1
-"""Times what is measured: between the points looked at, the distance rises by no more."""
+MARGIN = 8 / 7
+"""Times what is measured: where the lines meet between two points that are looked at, an eighth of
+the edge apart, the distance is no more."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -44,10 +44,10 @@ class MultiTriangulation:
     first: (a + 1,) int32: arc i has faces[first[i] : first[i + 1]], at least one.
     material: (a,) int32 index into the plant's materials, one for all faces of a patch.
     start, end: (a,) int32 nodes: which simplifies the patch away, and which made it.
-    error: (n,) float64 metres: what the node makes of its part of the original is nowhere further
-    from it; nor is what nodes below make. Measured from the original's vertices and along its
-    edges, with a margin for what lies between (displacement.py). 0 at the drain, infinite at the
-    source, and nowhere less than at a node below.
+    error: (n,) float64 metres: no point of the original is further from what the node, or one
+    below, has made of it. Measured from the original's vertices and along its edges, with a margin
+    for what lies between (displacement.py). 0 at the drain, infinite at the source, and nowhere
+    less than at a node below.
     center, radius: (n, 3), (n,) float64 metres: a sphere round all that the node simplifies, and
     round the spheres of the nodes below; round everything at the source. No meaning at the drain.
     """

@@ -98,43 +98,45 @@ class Rounds:
             self._round()
 
     def _round(self) -> None:
-        positions = self.sheets.positions
         present, patch = np.unique(self.live_patch, return_inverse=True)
-        group = groups_of(self.live, positions, patch)
-        made_of = np.zeros(len(present), np.int64)
-        made_of[patch] = group  # whole patches
+        group = groups_of(self.live, self.sheets.positions, patch)
         bound = self._bounds(group)
         limit = (self.reach - bound.radius) * self.slope
-
         before = np.bincount(group)
         todo = self.live.regrouped(group).of((limit > bound.error)[group])
         made = halved(todo, self.sheets, limit)
         after = np.bincount(made.group, minlength=len(before))
         done = (after > 0) & (after <= FEWER * before)
-        made = made.of(done[made.group])
-        over = group[self.marks.face]
+
+        made, over = made.of(done[made.group]), group[self.marks.face]
+        corners = self.sheets.positions[made.faces]
         far, near = displaced(
-            self.marks, np.where(done[over], over, -1), positions[made.faces], made.group, len(done)
+            self.marks, np.where(done[over], over, -1), corners, made.group, len(done)
         )
         error = np.maximum(np.maximum(bound.error, far), LEAST)
         done &= error <= limit
-
         node = np.full(len(done), -1)
         node[done] = len(self.nodes) + np.arange(done.sum())
         self.nodes = self.nodes.and_(Nodes(error, bound.center, bound.radius).of(done))
-        self.above[present] = node[made_of]
+        group_of = np.zeros(len(present), np.int64)
+        group_of[patch] = group  # whole patches
+        self.above[present] = node[group_of]
         self.tries[present] += 1
-        kept = done[made.group]
-        fresh = self._add(made.of(kept), node)
-        stays = ~done[group] & (self.tries[self.live_patch] < TRIES)
-        # where the marks' triangles have gone: those that stay come first
+        self._replace(~done[group] & (self.tries[self.live_patch] < TRIES), made, near, node)
+
+    def _replace(self, stays: Flags, made: Triangles, near: Labels, node: Labels) -> None:
+        """Of the live triangles, let (l,) stay, and then come those made by nodes (g,), -1 for
+        none. near: (m,) which of `made` each mark is over, -1 for none."""
+        kept = node[made.group] >= 0
         old, new = np.cumsum(stays) - 1, np.cumsum(kept) - 1 + stays.sum()
         face = np.where(stays[self.marks.face], old[self.marks.face], -1)
-        moved = done[over]
+        moved = np.flatnonzero(near >= 0)
+        moved = moved[kept[near[moved]]]
         face[moved] = new[near[moved]]
         self.marks = self.marks.over(face)
-        self.live = together([self.live.of(stays), made.of(kept)])
-        self.live_patch = np.concatenate([self.live_patch[stays], fresh])
+        made = made.of(kept)
+        self.live_patch = np.concatenate([self.live_patch[stays], self._add(made, node)])
+        self.live = together([self.live.of(stays), made])
 
     def _add(self, triangles: Triangles, node: Labels) -> Labels:
         """Make patches of triangles that nodes (g,) have made of their groups; (n,) the patches."""
