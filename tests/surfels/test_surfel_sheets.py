@@ -54,6 +54,15 @@ def test_where_three_meet_all_are_held() -> None:
     assert (float(x[5]), 0.0, float(z[33])) not in held
 
 
+def test_a_slit_is_no_seam() -> None:
+    """Two halves of a meadow that lie a billionth apart: both borders are held."""
+    plant = hills(10)
+    corners = plant.corners.copy()
+    corners[plant.face_centroids[:, 0] > 0.5, :, 0] += 1e-9
+    slit = surface(corners.reshape(-1, 3), np.arange(600).reshape(-1, 3))
+    assert len(held_places(slit)) == 40 + 2 * 9 + 2
+
+
 def test_backs_of_their_own_are_sheets_of_their_own() -> None:
     """Four triangles at each edge, in pairs by their vertices; the rim, where front and back are
     back to back, is held."""

@@ -19,7 +19,6 @@ from scipy.sparse.csgraph import connected_components
 
 from vegtool.arrays import FloatArray, unit
 from vegtool.meshes.collapse import uncollapsed
-from vegtool.meshes.pieces import WELD
 from vegtool.plant import Plant
 
 Labels = npt.NDArray[np.int64]
@@ -85,10 +84,10 @@ def together(parts: list[Triangles]) -> Triangles:
 
 
 def sheets(plant: Plant) -> Sheets:
-    """The sheets that a plant consists of; vertices closer than WELD are at one place."""
+    """The sheets that a plant consists of. Vertices are at one place if it is the same to the bit:
+    a slit, however narrow, stays as it is."""
     local = (plant.positions - plant.center) / (plant.radius or 1.0)
-    cells = np.rint(local / WELD).astype(np.int64)
-    place = np.unique(cells, axis=0, return_inverse=True)[1].ravel()
+    place = np.unique(plant.positions + 0.0, axis=0, return_inverse=True)[1].ravel()
     corners = place[plant.faces].ravel()
     whole = uncollapsed(place[plant.faces])
     first, second, alone = _joined(plant, place[plant.faces], whole)
@@ -102,7 +101,7 @@ def sheets(plant: Plant) -> Sheets:
     ones = np.ones(len(joined[0]), bool)
     graph = coo_matrix((ones, joined), shape=(len(corners), len(corners)))
     count, fan = connected_components(graph, directed=False)
-    positions, held, stays = np.empty((count, 3)), np.zeros(len(cells), bool), np.zeros(count, bool)
+    positions, held, stays = np.empty((count, 3)), np.zeros(len(place), bool), np.zeros(count, bool)
     positions[fan] = local[plant.faces.ravel()]
     held[corners[alone]] = held[corners[following(alone)]] = True
     stays[fan] = held[corners]
