@@ -17,6 +17,7 @@ import numpy as np
 
 from vegtool.arrays import FloatArray, unit
 from vegtool.meshes.distance import to_triangles
+from vegtool.surfels.faces import Faces
 from vegtool.surfels.sheets import Flags, Labels, Sheets, Triangles, edge_keys, following, runs
 
 TURN = 0.4
@@ -42,7 +43,7 @@ class Asks:
 
     start, end: (m,) int64 vertices: which goes, and where. group: (m,) of the triangles about it.
     gone, kept: (2, m) int64 their corners in the edge's two triangles, either side of a seam.
-    error: (m,) squared displacement. cost: (m,) least goes first.
+    moves: (m,) how far the surface moves. error: (m,) squared, no less. cost: (m,) least goes first.
     """
 
     start: Labels
@@ -50,6 +51,7 @@ class Asks:
     group: Labels
     gone: Labels
     kept: Labels
+    moves: FloatArray
     error: FloatArray
     cost: FloatArray
 
@@ -57,7 +59,7 @@ class Asks:
         """Some of them."""
         return Asks(
             self.start[rows], self.end[rows], self.group[rows], self.gone[:, rows],
-            self.kept[:, rows], self.error[rows], self.cost[rows],
+            self.kept[:, rows], self.moves[rows], self.error[rows], self.cost[rows],
         )  # fmt: skip
 
 
@@ -76,6 +78,7 @@ class Pass:
         a, b, c = (self.positions[self.faces[:, i]] for i in range(3))
         cross = np.cross(b - a, c - a)
         self.area, self.normal = np.linalg.norm(cross, axis=1), unit(cross)
+        self.ground = Faces(self.positions[self.faces], triangles.group)
         self.own = np.zeros(self.count, np.int64)
         self.own[self.corner] = np.repeat(triangles.group, 3)
         self.slots = np.argsort(self.corner, kind="stable")
@@ -109,17 +112,17 @@ class Pass:
         order = np.lexsort((cost, start))
         first = runs(start[order])
         many = np.diff(first, append=len(order))
-        best, asking = [], np.zeros(self.count, bool)
+        best, asking, moves = [], np.zeros(self.count, bool), np.zeros(len(start))
         for nth in range(EDGES):
             rows = order[first[many > nth] + nth]
             rows = rows[~asking[start[rows]]]
             away = self._away(start[rows], end[rows])
             rows, away = rows[away < np.inf], away[away < np.inf]
-            error[rows] = np.maximum(error[rows], away**2)
+            moves[rows], error[rows] = away, np.maximum(error[rows], away**2)
             cost[rows] = np.maximum(cost[rows], away**2)
             asking[start[rows]] = True
             best.append(rows)
-        edges = Asks(start, end, self.own[start], gone, kept, error, cost)
+        edges = Asks(start, end, self.own[start], gone, kept, moves, error, cost)
         return edges.of(np.sort(np.concatenate(best)))
 
     def _along_seams(self) -> tuple[Labels, Labels, Labels, Labels]:
@@ -179,9 +182,7 @@ class Pass:
 
         edge = np.flatnonzero(fine[which] & ~shared[stay])
         was, of = self._around(start[which[edge]])
-        off = to_triangles(((a + b) / 2)[edge][of], self.positions[self.faces[was // 3]])
-        back = np.full(len(edge), np.inf)
-        np.minimum.at(back, of, off)
+        back = self.ground.least((a[edge] + b[edge]) / 2, of, was // 3)
         np.maximum.at(result, which[edge], back)
         return result
 

@@ -22,13 +22,14 @@ LEAST = 2.0**-23
 """Plant radii: a displacement that is none, as float32 does not tell it."""
 
 
-def halved(triangles: Triangles, sheets: Sheets, limit: FloatArray) -> Triangles:
-    """What is left of the triangles, sorted by group.
+def halved(triangles: Triangles, sheets: Sheets, limit: FloatArray) -> tuple[Triangles, FloatArray]:
+    """What is left of the triangles, sorted by group; and (g,) the most that one edge that has
+    collapsed moved a group's surface.
 
     limit: (g,) plant radii, how far the vertices of each group may be displaced.
     """
     surplus = -(-np.bincount(triangles.group, minlength=len(limit)) // 4)  # each takes two along
-    done = []
+    done, moves = [], np.zeros(len(limit))
     for nth in range(PASSES):
         if not len(triangles):
             break
@@ -37,6 +38,7 @@ def halved(triangles: Triangles, sheets: Sheets, limit: FloatArray) -> Triangles
         if nth == 0:
             limit = np.minimum(limit, _usual(asks, len(limit)))
         asks = one.winners(asks.of(asks.error <= limit[asks.group] ** 2), surplus)
+        np.maximum.at(moves, asks.group, asks.moves)
         went = np.bincount(asks.group, minlength=len(limit))
         surplus = surplus - went
         more = (went > 0) & (surplus > 0)
@@ -44,7 +46,7 @@ def halved(triangles: Triangles, sheets: Sheets, limit: FloatArray) -> Triangles
         done.append(triangles.of(~more[triangles.group]))
         triangles = triangles.of(more[triangles.group])
     left = together([*done, triangles])
-    return left.of(np.argsort(left.group, kind="stable"))
+    return left.of(np.argsort(left.group, kind="stable")), moves
 
 
 def _usual(asks: Asks, groups: int) -> FloatArray:

@@ -46,8 +46,9 @@ class MultiTriangulation:
     start, end: (a,) int32 nodes: which simplifies the patch away, and which made it.
     error: (n,) float64 metres: no point of the original is further from what the node, or one
     below, has made of it. Measured from the original's vertices and along its edges, with a margin
-    for what lies between (displacement.py). 0 at the drain, infinite at the source, and nowhere
-    less than at a node below.
+    for what lies between (displacement.py); and never less than what a single collapse moved the
+    surface, so that it does not lead away from the original either. 0 at the drain, infinite at the
+    source, and nowhere less than at a node below.
     center, radius: (n, 3), (n,) float64 metres: a sphere round all that the node simplifies, and
     round the spheres of the nodes below; round everything at the source. No meaning at the drain.
     """

@@ -104,7 +104,7 @@ class Rounds:
         limit = (self.reach - bound.radius) * self.slope
         before = np.bincount(group)
         todo = self.live.regrouped(group).of((limit > bound.error)[group])
-        made = halved(todo, self.sheets, limit)
+        made, moves = halved(todo, self.sheets, limit)
         after = np.bincount(made.group, minlength=len(before))
         done = (after > 0) & (after <= FEWER * before)
 
@@ -113,7 +113,7 @@ class Rounds:
         far, near = displaced(
             self.marks, np.where(done[over], over, -1), corners, made.group, len(done)
         )
-        error = np.maximum(np.maximum(bound.error, far), LEAST)
+        error = np.max([bound.error, far, moves, np.full(len(done), LEAST)], axis=0)
         done &= error <= limit
         node = np.full(len(done), -1)
         node[done] = len(self.nodes) + np.arange(done.sum())
