@@ -43,7 +43,8 @@ class Asks:
 
     start, end: (m,) int64 vertices: which goes, and where. group: (m,) of the triangles about it.
     gone, kept: (2, m) int64 their corners in the edge's two triangles, either side of a seam.
-    moves: (m,) how far the surface moves. error: (m,) squared, no less. cost: (m,) least goes first.
+    moves: (m,) how far the surface moves. error: (m,) squared, no less. cost: (m,) the least goes
+    first.
     """
 
     start: Labels
