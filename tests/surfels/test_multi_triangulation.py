@@ -261,7 +261,7 @@ EXTREMES = {
     "soup": soup,
     "lines": with_lines,
     "tiny": lambda: replace(hills(12), positions=hills(12).positions * 1e-9),
-    "far": lambda: replace(hills(12), positions=hills(12).positions + 1e6),
+    "far": lambda: replace(hills(30), positions=hills(30).positions + 1e8),
 }
 
 

@@ -28,7 +28,8 @@ REACH = 2.0
 """Mean sides of the plant's bounds: z_min of a node at most (section 5)."""
 
 CONTAINED = 1e-9
-"""Of a sphere's radius: what spheres below it may lie outside, by rounding."""
+"""Of a sphere's radius: what spheres below it may lie outside, by rounding; beside that of their
+places."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +88,8 @@ class MultiTriangulation:
         inner = end > 0
         above, below = start[inner], end[inner]
         apart = np.linalg.norm(center[above] - center[below], axis=1)
-        if (apart + radius[below] > radius[above] * (1 + CONTAINED)).any():
+        slack = CONTAINED * radius[above] + 8 * np.spacing(np.abs(center).max())
+        if (apart + radius[below] > radius[above] + slack).any():
             raise ValueError(f"{name}.radius: spheres must contain those of the nodes below")
         for key, value in (
             ("faces", faces), ("first", first), ("material", material), ("start", start),
