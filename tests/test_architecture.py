@@ -33,7 +33,6 @@ MAY_IMPORT: dict[str, set[str]] = {
     "meshes": set(),
     "baselines": {"formats", "baking", "gl", "measure", "meshes"},
     "hybrid": {"clustering", "boxes", "gl", "baking", "measure", "meshes", "refine"},
-    "surfels": {"meshes"},
     "refine": {"branches", "clustering", "boxes", "gl", "baking", "lighting", "measure"},
     "surfels": {"gl", "meshes"},
     "tiles": {

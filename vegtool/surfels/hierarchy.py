@@ -7,7 +7,8 @@ then what is drawn is what a descent from the root would draw. It does where
 
 - distances are to spheres that contain those of all below, and
 - z_min of a father is at least 1 / sqrt(theta (2 - theta)) times that of its children: a child is
-  valid there from all directions, not from the share theta alone.
+  valid there from all directions, not from the share theta alone. The reduction sees to that
+  (reduce.py).
 """
 
 from __future__ import annotations
@@ -15,32 +16,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from vegtool.arrays import FloatArray, IntArray, checked
+from vegtool.surfels.base import Base
 from vegtool.surfels.box import SurfelBoxes, boxes_of
-from vegtool.surfels.validity import distance_error, spread
+from vegtool.surfels.validity import distance_error
 
 TOGETHER = 200_000
 """Triangles whose boxes are found at once."""
-
-Ints = npt.NDArray[np.integer]
-
-
-@dataclass(frozen=True, eq=False)
-class Base:
-    """What a hierarchy stands on: p patches of t triangles.
-
-    corners: (t, 3, 3) metres, patch by patch. first: (p,) int the first triangle of each, none of
-    which is empty. error: (p,) metres, of the surface as triangles: none is coarser. center: (p, 3)
-    and radius: (p,) metres, spheres that errors are seen from, round the patches.
-    """
-
-    corners: FloatArray
-    first: Ints
-    error: FloatArray
-    center: FloatArray
-    radius: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +31,7 @@ class SurfelHierarchy:
     """b billboards over p patches; a father comes after its children.
 
     boxes: b, in metres. father: (b,) int32, -1 at a root. error: (b,) metres, epsilon z_min / pc,
-    at least d sqrt(theta (2 - theta)) (eq. 8), and rising as said above. center: (b, 3) and radius:
+    at least d sqrt(theta (2 - theta)) (eq. 8), nowhere less than below. center: (b, 3) and radius:
     (b,) metres, spheres that distances are to. above: (p,) int32 the lowest billboard over each
     patch, -1 where there is none. theta: share of directions.
     """
@@ -113,15 +96,15 @@ def whole(base: Base, children: IntArray, theta: float) -> SurfelHierarchy:
     return monotone(base, SurfelHierarchy(boxes, father, start, boxes.center, radius, above, theta))
 
 
-def monotone(base: Base, one: SurfelHierarchy) -> SurfelHierarchy:
-    """The same with errors and spheres that only grow on the way up, from those of the patches."""
+def monotone(base: Base, one: SurfelHierarchy, growth: float = 1.0) -> SurfelHierarchy:
+    """The same with errors and spheres that only grow on the way up, from those of the patches; a
+    father's error is at least `growth` times that of its children."""
     error, radius = one.error.copy(), one.radius.copy()
     over = one.above >= 0
     at = one.above[over]
     away = np.linalg.norm(one.center[at] - base.center[over], axis=1) + base.radius[over]
     np.maximum.at(radius, at, away)
     np.maximum.at(error, at, base.error[over])
-    growth = 1 / spread(one.theta)
     for child, father in enumerate(one.father.tolist()):
         if father >= 0:
             away_m = float(np.linalg.norm(one.center[father] - one.center[child]))

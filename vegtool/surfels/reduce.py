@@ -10,17 +10,20 @@ from __future__ import annotations
 import numpy as np
 
 from vegtool.arrays import FloatArray
+from vegtool.surfels.base import Base
 from vegtool.surfels.box import SurfelBoxes
-from vegtool.surfels.hierarchy import Base, SurfelHierarchy, monotone
-from vegtool.surfels.validity import distance_error
+from vegtool.surfels.hierarchy import SurfelHierarchy, monotone
+from vegtool.surfels.validity import distance_error, spread
 
 DS_MAX = 1.5
 """Mean ratio of a father's z_min to its children's, below which what is between them goes."""
 
 
 def reduced(base: Base, one: SurfelHierarchy, ds_max: float = DS_MAX) -> SurfelHierarchy:
-    """The hierarchy without what is of no use; monotone, as it was."""
-    return similar_gone(base, coarser_kept(base, one), ds_max)
+    """The hierarchy without what is of no use, so that a billboard's validity and its father's say
+    what is drawn (select.py)."""
+    left = similar_gone(base, coarser_kept(base, one), ds_max)
+    return monotone(base, left, 1 / spread(left.theta))
 
 
 def coarser_kept(base: Base, one: SurfelHierarchy) -> SurfelHierarchy:
@@ -40,8 +43,11 @@ def coarser_kept(base: Base, one: SurfelHierarchy) -> SurfelHierarchy:
 
 
 def similar_gone(base: Base, one: SurfelHierarchy, ds_max: float) -> SurfelHierarchy:
-    """Without billboards whose ds (eq. 17) is less than ds_max; what has no father stays, and what
-    has patches alone below, whose z_min is that of their triangles."""
+    """Without billboards whose ds (eq. 17) is less than ds_max, and those whose father's z_min is
+    not so much greater that they are valid there from everywhere. What has no father stays. Patches
+    below count with the z_min of their triangles.
+    """
+    growth = 1 / spread(one.theta)
     father = one.father.tolist()
     below: list[set[int]] = [set() for _ in father]
     for child, above in enumerate(father):
@@ -57,7 +63,8 @@ def similar_gone(base: Base, one: SurfelHierarchy, ds_max: float) -> SurfelHiera
         if above < 0:
             continue
         errors = np.array([one.error[child] for child in below[number]] + lows[number])
-        if similarity(float(one.error[above]), errors) >= ds_max:
+        coarser = float(one.error[above])
+        if coarser >= growth * one.error[number] and similarity(coarser, errors) >= ds_max:
             continue
         keep[number] = False
         below[above].discard(number)

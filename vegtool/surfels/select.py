@@ -33,6 +33,16 @@ def top_down(one: SurfelHierarchy, eye: FloatArray, epsilon: float, pc: float) -
     return np.flatnonzero(found & ~over).astype(np.int32)
 
 
+def left_to_triangles(one: SurfelHierarchy, drawn: IntArray) -> Bools:
+    """(p,) the patches that no billboard shows of those drawn, (m,): they are drawn as triangles,
+    as fine as the multi-triangulation has it."""
+    shown = np.zeros(len(one) + 1, dtype=bool)  # the last: nothing
+    shown[drawn] = True
+    for number in range(len(one) - 1, -1, -1):
+        shown[number] |= shown[one.father[number]]
+    return np.asarray(~shown[one.above])
+
+
 @dataclass(frozen=True, eq=False)
 class Sequence:
     """A hierarchy as an array of billboards by what is left of z_min of their fathers.
