@@ -121,6 +121,15 @@ def test_weights_decide_what_it_becomes() -> None:
     assert ends["polygons first"].triangles == 2 * ends["polygons first"].billboards
 
 
+@pytest.mark.parametrize("weights", [Weights(1.0, 1.0, 1.0), Weights(1.0, 3.0, 0.01)])
+def test_it_ends_where_nothing_saves(weights: Weights) -> None:
+    """Two balls through each other: what is not worth it at first is, once others have left."""
+    now = made(together(ball(), ball((0.7, 0.2, 0.1))), weights)
+    last = list(descent(now))[-1]
+    changes = [one.change.cost(weights) for nth in range(now.sources) for one in now.proposals(nth)]
+    assert all(change > -1e-9 * last.cost for change in changes)
+
+
 def test_equal_faces_of_two_materials_stay_apart() -> None:
     """Bark and leaf in the same places: the bark alone may leave."""
     bark = ball()
