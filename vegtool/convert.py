@@ -210,7 +210,8 @@ class ConvertOptions:
         hybrid = self.method == HYBRID
         changed = [item for item in fields(self) if getattr(self, item.name) != item.default]
         for item in changed:
-            if item.name in PLAIN and self.refine != "none" and not hybrid:
+            plain = item.name in PLAIN and not (hybrid and item.name == "method")
+            if plain and self.refine != "none":
                 raise UsageError(f"{flag_of(item)}: is the plain method's; add --refine none")
             if item.name in OF_HYBRIDS and not hybrid:
                 raise UsageError(f"{flag_of(item)}: is of hybrids alone; add --method {HYBRID}")

@@ -83,6 +83,16 @@ def test_terms_add_up_and_nothing_is_lost(model: str, weights: str, cheap: bool)
     assert all(a > b for a, b in pairwise(costs))
 
 
+def test_a_face_is_wrong_that_its_plane_shows_to_nobody() -> None:
+    """One triangle lies along the plane, one across it; as far as planes may reach, neither is
+    displaced."""
+    corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0], [1, 0, 0], [0, 0, 1]]
+    plant = mesh(corners, np.arange(6))
+    pair = np.arange(2, dtype=np.int32)
+    flat = Cloud(plant, pair, np.zeros_like(pair), np.array([[0.0, 0.0, 1.0]]), 1e12)
+    np.testing.assert_allclose(flat.wrong, [0.0, 1.0], atol=1e-9)
+
+
 def test_what_alpha_cuts_out_stays_on_billboards() -> None:
     now = made(tree(), Weights(1e9, 0.0, 0.0))
     list(descent(now))
@@ -119,6 +129,15 @@ def test_weights_decide_what_it_becomes() -> None:
     assert polygons == sorted(polygons, reverse=True)
     assert len(set(errors)) == 3
     assert ends["polygons first"].triangles == 2 * ends["polygons first"].billboards
+
+
+@pytest.mark.parametrize("weights", [Weights(1.0, 1.0, 1.0), Weights(1.0, 3.0, 0.01)])
+def test_it_ends_where_nothing_saves(weights: Weights) -> None:
+    """Two balls through each other: what is not worth it at first is, once others have left."""
+    now = made(together(ball(), ball((0.7, 0.2, 0.1))), weights)
+    last = list(descent(now))[-1]
+    changes = [one.change.cost(weights) for nth in range(now.sources) for one in now.proposals(nth)]
+    assert all(change > -1e-9 * last.cost for change in changes)
 
 
 def test_equal_faces_of_two_materials_stay_apart() -> None:

@@ -167,3 +167,12 @@ def test_pictures_and_patches_are_kept_where_they_help() -> None:
         errs = [float(scores(own.truth_at(near_m), one).values["flip"].mean())
                 for one in (whole, fewer)]  # fmt: skip
         assert errs[0] < errs[1] < 0.2
+
+
+@pytest.mark.gl
+def test_patches_keep_to_the_budget() -> None:
+    """Two triangles are one billboard: planes that patch its cracks would be two or three."""
+    plant = cards(40, replace(LEAF, alpha_mode="opaque"), 0.1)
+    with PlantBuffers(plant) as buffers:
+        level = hybrid_level(source(plant, buffers), Wanted(2, 12.0), Budget(2))
+        assert level.triangles == 2

@@ -177,6 +177,8 @@ def test_a_hybrid_has_a_shadow() -> None:
         ({"weights": "error=x"}, "got 'error=x'"),
         ({"weights": "fill=-1"}, "got 'fill=-1'"),
         ({"weights": "error=1", "triangles": 10}, "--triangles, --fill"),
+        ({"shape": "crossed"}, "--shape: is the plain method's"),
+        ({"orientation_weight": 0.5}, "--orientation-weight: is the plain method's"),
         ({"refine": "none"}, "--method hybrid: goes with --refine full"),
     ],
 )

@@ -10,8 +10,8 @@ import pytest
 from hybrid_cases import ball, book, grid, mesh, together, tube
 
 from vegtool.hybrid.cost import DISPLACED, Terms, Weights, misplaced
-from vegtool.hybrid.reduction import FEWEST, ROUGH, reductions
-from vegtool.meshes.collapse import uncollapsed
+from vegtool.hybrid.reduction import FEWEST, ROUGH, displaced, reductions
+from vegtool.meshes.collapse import Collapsed, uncollapsed
 from vegtool.meshes.pieces import Surface, all_welded
 from vegtool.plant import Plant
 
@@ -90,6 +90,23 @@ def test_a_ball_shrinks_no_further_than_its_error_says() -> None:
         lost = max(0.0, 1 - one.areas.sum() / whole.areas.sum())
         assert wrong / whole.areas.sum() < DISPLACED * 0.12 * radius / reach + lost
     assert made.triangles[-1] < 20
+
+
+def test_area_that_is_lost_is_not_shown() -> None:
+    """Where no displacement counts, what a ball inscribed in another lacks is all that is wrong."""
+    made = reductions(surface(ball(rows=12, columns=18)), 1e12, ("stay",))
+    lost = np.maximum(made.area[0] - made.area, 0.0)
+    assert lost[-1] > 0.1 * made.area[0]
+    np.testing.assert_allclose(made.wrong, lost, atol=1e-9)
+
+
+def test_a_border_that_moves_leaves_a_gap() -> None:
+    """A square loses a corner: half of the two edges that met there are half a diagonal away."""
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=np.float64)
+    faces = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
+    became = np.array([[0, 1, 2], [0, 2, 2]], dtype=np.int32)
+    made = Collapsed(square[:3], faces[:1], became)
+    assert displaced(Surface(square, faces, faces), made, 1e12) == pytest.approx(0.5**0.5)
 
 
 def test_faces_without_area_go_first() -> None:

@@ -60,22 +60,20 @@ def cones(mesh: Mesh) -> tuple[IntArray, FloatArray]:
     size, normal = np.linalg.norm(area, axis=1), unit(area)
     beside = neighbours(mesh.place)
     chart = np.full(len(size), -1, dtype=np.int32)
-    axes = list[FloatArray]()
+    count = 0
     for seed in np.argsort(-size, kind="stable").tolist():
         if chart[seed] >= 0:
             continue
-        number, looks = len(axes), normal[seed]
-        chart[seed] = number
+        looks, chart[seed] = normal[seed], count
         waiting = deque([seed])
         while waiting:
             for other in beside[waiting.popleft()]:
                 if chart[other] < 0 and normal[other] @ looks > CONE:
-                    chart[other] = number
+                    chart[other] = count
                     waiting.append(other)
-        total = area[chart == number].sum(axis=0)
-        mean = unit(total)
-        axes.append(mean if mean.any() else np.array([0.0, 1.0, 0.0]))
-    return chart, np.array(axes)
+        count += 1
+    axes = unit(np.stack([np.bincount(chart, along, count) for along in area.T], axis=1))
+    return chart, np.where(axes.any(axis=1, keepdims=True), axes, [0.0, 1.0, 0.0])
 
 
 def neighbours(faces: IntArray) -> list[list[int]]:

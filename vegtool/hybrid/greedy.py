@@ -285,18 +285,20 @@ def descent(start: Descent, cheap: bool = False, progress: Progress = silent) ->
     for source in range(start.sources):
         progress("proposals", source / start.sources)
         look(source, 0)
-    version = 0
+    version, idle = 0, list[tuple[float, int, int]]()
     while waiting:
-        change, source, seen = heapq.heappop(waiting)
+        change, source, seen = offer = heapq.heappop(waiting)
         if seen < version:  # something has changed since
             look(source, version)
-            continue
-        if change >= -LEAST * start.terms.cost(start.weights):
-            break
-        start.accept(latest[source])
-        version += 1
-        yield _step(start, began)
-        look(source, version)
+        elif change >= -LEAST * start.terms.cost(start.weights):
+            idle.append(offer)  # until something changes: what saved nothing before may do so now
+        else:
+            start.accept(latest[source])
+            version += 1
+            yield _step(start, began)
+            look(source, version)
+            while idle:
+                heapq.heappush(waiting, idle.pop())
 
 
 def _costliest(start: Descent, began: float) -> Iterator[Step]:

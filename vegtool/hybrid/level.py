@@ -58,7 +58,8 @@ def hybrid_level(
         with timed(seconds, "patches"):
             more = begun(patched(start.cloud, FURTHER), start.weights, start.per_billboard)
         other = descended(source, wanted, more, aim, cheap, part_of(progress, 0.6, 0.3))
-        made = other if other.error < PATCHED * made.error else made
+        if keeps(other, made, aim) and other.error < PATCHED * made.error:
+            made = other
     if whole and made.level.charts is not None:
         plain = Made(made.found, drawn_as(source, wanted, made.found, pictured=False), made.truth)
         made = made if made.error < TEXTURED * plain.error else plain
@@ -82,6 +83,15 @@ class Made:
     def error(self) -> float:
         """FLIP."""
         return float(scores(self.truth, self.level).values["flip"].mean())
+
+
+def keeps(other: Made, made: Made, aim: Weights | Budget) -> bool:
+    """Whether another level keeps to a budget, or exceeds it no farther than what is made."""
+    if isinstance(aim, Weights):
+        return True
+    if other.level.triangles > max(aim.triangles, made.level.triangles):
+        return False
+    return aim.fill is None or other.found.terms.fill <= max(aim.fill, made.found.terms.fill)
 
 
 def descended(
