@@ -327,7 +327,7 @@ def convert(
             from vegtool.refine.reach import coverage_notes
 
             notes = (*notes, *coverage_notes(kept, truth_at))
-    notes = (*notes, *light_notes(plant, sun))
+    notes = (*notes, *light_notes(plant, sun), *budget_notes(kept, options))
     progress("levels", 1.0)
     told = {**asdict(options), **asdict(measure)}
     baked = {} if sun is None else sun.as_dict()
@@ -341,6 +341,19 @@ def convert(
         baked,
         shadow,
     )
+
+
+def budget_notes(levels: Sequence[Level], options: ConvertOptions) -> tuple[str, ...]:
+    """Sentences on hybrids of more triangles than were allowed."""
+    if options.triangles is None:
+        return ()
+    over = [
+        f"LOD{number}: no hybrid was found of {options.triangles:,} triangles or fewer; it has "
+        f"{level.triangles:,}"
+        for number, level in enumerate(levels, start=1)
+        if level.triangles > options.triangles
+    ]
+    return tuple(over)
 
 
 def light_notes(plant: Plant, sun: Sun | None) -> tuple[str, ...]:

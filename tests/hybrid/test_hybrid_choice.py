@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hybrid_cases import LEAF, ball, grid, mesh, together
 
-from vegtool.convert import ConvertOptions, convert
+from vegtool.convert import ConvertOptions, budget_notes, convert
 from vegtool.gl.upload import PlantBuffers
 from vegtool.hybrid.budget import Tried, least_fill, within
 from vegtool.hybrid.cloud import cloud_of
@@ -18,7 +18,7 @@ from vegtool.hybrid.options import Budget, Weights
 from vegtool.hybrid.or_refined import mesh_holds
 from vegtool.hybrid.reduction import border_lengths
 from vegtool.hybrid.start import begun, filling, per_billboard, started
-from vegtool.lod import Display
+from vegtool.lod import Display, Level
 from vegtool.measure.chain import views_of
 from vegtool.measure.options import MeasureOptions
 from vegtool.measure.scores import TruthsAt, scores
@@ -69,6 +69,32 @@ def test_a_step_that_is_kept_is_not_changed_by_later_ones() -> None:
         told.append((now.triangles, now.terms, now.in_mesh.sum()))
     assert len(kept) > 1
     assert [(one.triangles, one.terms, one.in_mesh.sum()) for one in kept] == told
+
+
+def test_what_is_left_of_a_budget_is_spent() -> None:
+    """Two balls, of which one weight takes both or neither: with triangles for one and a half, the
+    half is used too."""
+    plant = together(ball(), ball((3.0, 0.0, 0.0)))
+    start = begun(cloud_of(plant, 8), Weights())
+    errors = []
+    for triangles in (40, 60, 80, 100, 120):
+        tried = Tried(start, Budget(triangles), cheap=False)
+        tried.at_fill(1e-3)
+        before = tried.best.terms.error
+        found = tried.spent(1e-3)
+        assert found.triangles <= triangles and found.terms.error <= before
+        errors.append(found.terms.error)
+    assert errors == sorted(errors, reverse=True)
+    assert found.terms.polygons * len(plant.faces) == pytest.approx(found.triangles)
+
+
+def test_a_budget_that_is_exceeded_is_told() -> None:
+    level = Level("mesh", mesh=ball())
+    options = ConvertOptions(method="hybrid", triangles=level.triangles - 1)
+    (note,) = budget_notes([level], options)
+    assert note.startswith("LOD1: no hybrid was found of ")
+    assert not budget_notes([level], replace(options, triangles=level.triangles))
+    assert not budget_notes([level], ConvertOptions())
 
 
 def test_what_fits_is_better_than_what_does_not() -> None:

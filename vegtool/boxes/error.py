@@ -12,6 +12,10 @@ from vegtool.plant import Plant
 
 SAMPLES = 65536
 """Points on the surface, each for the same area."""
+FEW = 32
+"""Triangles of a mesh: of no more, all are looked at."""
+NO_AREA = 1e-9
+"""Of a mesh's: a triangle with no more shows nothing."""
 NEAREST = 8
 """Points of a mesh around a point whose triangles may be the nearest."""
 
@@ -65,16 +69,23 @@ def _to_planes(points: FloatArray, cluster: IntArray, billboards: Billboards) ->
 def distance_to_mesh(points: FloatArray, mesh: Plant) -> FloatArray:
     """(n,) metres from points (n, 3) to the surface of a mesh.
 
-    Of the triangles under the nearest of many points spread over it: never too small, and exact
-    where one of these triangles is the nearest.
+    Of a FEW triangles with an area, exact. Of more, of those under the nearest of many points
+    spread over the mesh: never too small, and exact where one of these triangles is the nearest.
     """
     from scipy.spatial import cKDTree
 
     if not len(points):
         return np.zeros(0)
+    nearest = np.full(len(points), np.inf)
+    if len(mesh.faces) <= FEW:
+        area = mesh.face_areas
+        for corners in mesh.corners[area > NO_AREA * area.sum()]:
+            nearest = np.minimum(
+                nearest, to_triangles(points, np.broadcast_to(corners, (len(points), 3, 3)))
+            )
+        return nearest
     face, samples = surface_samples(mesh, SAMPLES)
     _, near = cKDTree(samples).query(points, NEAREST)
-    nearest = np.full(len(points), np.inf)
     for candidate in face[near].T:
         nearest = np.minimum(nearest, to_triangles(points, mesh.corners[candidate]))
     return nearest

@@ -10,7 +10,11 @@ the steps that they take, the best is kept.
 
 from __future__ import annotations
 
-from vegtool.hybrid.greedy import Descent, descent
+from collections.abc import Iterable
+
+import numpy as np
+
+from vegtool.hybrid.greedy import Descent, Proposal, descent
 from vegtool.hybrid.options import Budget, Weights
 from vegtool.progress import Progress, silent
 
@@ -18,6 +22,12 @@ LEAST, MOST = 1e-3, 1e3
 """Weights of polygons, of an error of 1, between which they are sought."""
 LEAST_FILL, MOST_FILL = 1e-3, 1e2
 """Weights of fill, of an error of 1: of no limit to it; and between which it is sought."""
+SPENDINGS = 13
+"""Weights of polygons with which what is left of a budget is spent."""
+SPENT = 0.97
+"""Of the triangles: with no less, the budget is spent."""
+STEP = 1e-9
+"""Of the cost: a step that saves less is none."""
 HALVINGS, FILL_HALVINGS = 10, 6
 """Of the ratios: to 1.4 % and to 20 %."""
 
@@ -29,17 +39,17 @@ def within(
     have the fewest triangles, that which fills least. start: tells the model and its cloud alone.
     cheap: as the poster."""
     tried = Tried(start, budget, cheap)
-    if tried.at_fill(LEAST_FILL, progress) or budget.fill is None:
-        return tried.best
-    low, high = LEAST_FILL, MOST_FILL
-    if tried.at_fill(high, progress):
-        for _ in range(FILL_HALVINGS):
-            middle = (low * high) ** 0.5
-            if tried.at_fill(middle, progress):
-                high = middle
-            else:
-                low = middle
-    return tried.best
+    fill = LEAST_FILL
+    if not tried.at_fill(fill, progress):
+        low, fill = LEAST_FILL, MOST_FILL
+        if tried.at_fill(fill, progress):
+            for _ in range(FILL_HALVINGS):
+                middle = (low * fill) ** 0.5
+                if tried.at_fill(middle, progress):
+                    fill = middle
+                else:
+                    low = middle
+    return tried.spent(fill)
 
 
 def least_fill(start: Descent) -> float:
@@ -79,6 +89,37 @@ class Tried:
             if self.merit(now) < self.merit(self.best):
                 self.best = now.copy()
         return now
+
+    def spent(self, fill: float) -> Descent:
+        """The best, and what else the triangles that it leaves may buy: with less and less weight
+        of polygons each billboard, body and part of the mesh is looked at once, and what saves
+        something without exceeding the budget is done."""
+        now = self.best
+        for polygons in np.geomspace(MOST, LEAST, SPENDINGS):
+            if now.triangles >= SPENT * self.budget.triangles:
+                break
+            now.weights = Weights(1.0, float(polygons), fill)
+            for number in list(now.parts):
+                self._step(now, [now.refinement(number)])
+            for source in range(now.sources):
+                self._step(now, now.proposals(source))
+        return now
+
+    def _step(self, now: Descent, offers: Iterable[Proposal]) -> None:
+        """Take the best of what is proposed, if it saves something and the budget allows it."""
+        count, fill = len(now.part_of), self.budget.fill
+        terms, best = now.terms, None
+        for offer in offers:
+            after = terms + offer.change
+            fits = round(after.polygons * count) <= self.budget.triangles
+            if not fits or (fill is not None and after.fill > max(fill, terms.fill)):
+                continue
+            if best is None or offer.change.cost(now.weights) < best.change.cost(now.weights):
+                best = offer
+        if best is None or best.change.error >= 0:
+            return
+        if best.change.cost(now.weights) < -STEP * terms.cost(now.weights):
+            now.accept(best)
 
     def merit(self, one: Descent) -> tuple[float, float, float]:
         """Less is better: triangles over the budget, fill over it, error."""

@@ -198,6 +198,12 @@ class Descent:
             change = change + self.billboard(left) - self.board[plane]
         return Proposal(faces, parts, joined, change)
 
+    def refinement(self, number: int) -> Proposal:
+        """A part of the mesh with as many triangles as cost least now."""
+        part = self.part(self.parts[number].faces)
+        change = part.terms - self.parts[number].terms
+        return Proposal(part.faces[:0], (part,), (number,), change)
+
     def left(self, faces: Labels) -> Iterator[tuple[int, Labels]]:
         """The billboards that show any of these faces, and the pairs that they are left with."""
         gone = np.zeros(len(self.part_of), dtype=bool)

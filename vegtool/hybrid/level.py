@@ -63,8 +63,11 @@ def hybrid_level(
     if whole and made.level.charts is not None:
         plain = Made(made.found, drawn_as(source, wanted, made.found, pictured=False), made.truth)
         made = made if made.error < TEXTURED * plain.error else plain
-    progress("hybrid", 1.0)
-    return replace(made.level, seconds={**seconds, **made.level.seconds})
+    progress("hybrid", 0.95)
+    level = made.level
+    with timed(seconds, "error"):
+        error = error_of(made.found, level)
+    return replace(level, geometric_error_m=error, seconds={**seconds, **level.seconds})
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,14 +125,11 @@ def drawn_as(
     """What a descent has come to, for distances from `wanted.near_m` metres on. pictured: whether
     its mesh has pictures; else it has colours alone."""
     seconds: dict[str, float] = {}
-    plant, cloud = source.plant, found.cloud
     density = source.truth_at.display.pixels_per_metre(wanted.near_m)
     with timed(seconds, "mesh"):
         mesh, charts, pictures = mesh_of(source, found, density if pictured else 0.0)
     left = np.sort(np.concatenate(found.pairs))
-    labels = np.full(len(plant.faces), -1, dtype=np.int32)
-    rest = cloud.of(left)
-    labels[rest.face] = rest.plane
+    rest = found.cloud.of(left)
     if len(left) or pictures is not None:
         level = baked(source, wanted, rest, density, mesh is not None, pictures, progress)
         seconds |= level.seconds
@@ -141,9 +141,16 @@ def drawn_as(
     else:
         level = Level("mesh", mesh=mesh, unlit=source.lit is not None)
         level = unbiased_color(level, source.truth_at(wanted.near_m))
-    with timed(seconds, "error"):
-        error = geometric_error(plant, labels, level.billboards, level.mesh, found.in_mesh)
-    return replace(level, near_distance_m=wanted.near_m, geometric_error_m=error, seconds=seconds)
+    return replace(level, near_distance_m=wanted.near_m, seconds=seconds)
+
+
+def error_of(found: Descent, level: Level) -> tuple[float, float]:
+    """The geometric error of a level that shows a hybrid."""
+    plant = found.cloud.plant
+    rest = found.cloud.of(np.sort(np.concatenate(found.pairs)))
+    labels = np.full(len(plant.faces), -1, dtype=np.int32)
+    labels[rest.face] = rest.plane
+    return geometric_error(plant, labels, level.billboards, level.mesh, found.in_mesh)
 
 
 def mesh_of(
