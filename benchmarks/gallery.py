@@ -112,7 +112,7 @@ def means(name: str, sitting: Sitting) -> list[str]:
 
 HYBRIDS = """## Hybrids
 
-`vegtool convert figure.glb --method hybrid --weights polygons=0.03`, then 0.3, 2 and 30: from
+`vegtool convert figure.glb --method hybrid --weights polygons=0.03`, then 0.3, 3 and 30: from
 nearly a mesh to nearly a cloud of billboards ([how](../methods/hybrid.md)). Drawn by
 `python benchmarks/hybrid.py`.
 

@@ -68,7 +68,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "methods" / "hybrid.md"
 MARK = "<!-- {} made by benchmarks/hybrid.py -->"
 PARTS = ("beside", "dial", "steps", "near")
-DIAL = (0.03, 0.3, 2.0, 30.0)
+DIAL = (0.03, 0.3, 3.0, 30.0)
 """Weights of polygons."""
 SOLID = ("statue", "height-field", "dead-tree", "grass-clump", "palm")
 """Samples of which alpha cuts nothing out."""
