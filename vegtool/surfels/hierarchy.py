@@ -13,7 +13,7 @@ then what is drawn is what a descent from the root would draw. It does where
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -43,6 +43,7 @@ class SurfelHierarchy:
     radius: FloatArray
     above: IntArray
     theta: float
+    least: float = 0.0
 
     def __post_init__(self) -> None:
         name, count = "SurfelHierarchy", len(self.boxes)
@@ -82,8 +83,9 @@ def ancestors(above: IntArray, father: IntArray) -> tuple[IntArray, IntArray]:
     return below[order], over[order]
 
 
-def whole(base: Base, children: IntArray, theta: float) -> SurfelHierarchy:
-    """A billboard for each patch and each pair of `merging.merged`, (p - 1, 2)."""
+def whole(base: Base, children: IntArray, theta: float, least: float = 0.0) -> SurfelHierarchy:
+    """A billboard for each patch and each pair of `merging.merged`, (p - 1, 2), with an error of so
+    many metres at least."""
     patches = len(base.first)
     total = patches + len(children)
     father = np.full(total, -1, dtype=np.int32)
@@ -91,9 +93,10 @@ def whole(base: Base, children: IntArray, theta: float) -> SurfelHierarchy:
     father[children[:, 0]] = father[children[:, 1]] = made
     above = np.arange(patches, dtype=np.int32)
     boxes = _boxes(base, *ancestors(above, father))
-    start = distance_error(boxes.half[:, 2], theta)
+    error = np.maximum(distance_error(boxes.half[:, 2], theta), least)
     radius = np.linalg.norm(boxes.half, axis=1)
-    return monotone(base, SurfelHierarchy(boxes, father, start, boxes.center, radius, above, theta))
+    start = SurfelHierarchy(boxes, father, error, boxes.center, radius, above, theta, least)
+    return monotone(base, start)
 
 
 def monotone(base: Base, one: SurfelHierarchy, growth: float = 1.0) -> SurfelHierarchy:
@@ -110,7 +113,7 @@ def monotone(base: Base, one: SurfelHierarchy, growth: float = 1.0) -> SurfelHie
             away_m = float(np.linalg.norm(one.center[father] - one.center[child]))
             radius[father] = max(radius[father], away_m + radius[child])
             error[father] = max(error[father], growth * error[child])
-    return SurfelHierarchy(one.boxes, one.father, error, one.center, radius, one.above, one.theta)
+    return replace(one, error=error, radius=radius)
 
 
 def _boxes(base: Base, patch: IntArray, over: IntArray) -> SurfelBoxes:

@@ -35,7 +35,7 @@ def coarser_kept(base: Base, one: SurfelHierarchy) -> SurfelHierarchy:
     needed = np.zeros(len(one))
     patch, over = one.pairs()
     np.maximum.at(needed, over, base.error[patch])
-    flat = distance_error(one.boxes.half[:, 2], one.theta)
+    flat = np.maximum(distance_error(one.boxes.half[:, 2], one.theta), one.least)
     keep = flat > needed
     if len(one):
         keep |= (one.father < 0) & (needed < np.inf)
@@ -89,9 +89,14 @@ def kept(base: Base, one: SurfelHierarchy, keep: np.ndarray) -> SurfelHierarchy:
         lowest[at] = number[at] if keep[at] else lowest[one.father[at]]
     boxes = one.boxes
     some = SurfelBoxes(boxes.center[keep], boxes.axes[keep], boxes.half[keep])
-    error = distance_error(some.half[:, 2], one.theta)
-    radius = np.linalg.norm(some.half, axis=1)
     left = SurfelHierarchy(
-        some, lowest[one.father[keep]], error, some.center, radius, lowest[one.above], one.theta
+        some,
+        lowest[one.father[keep]],
+        np.maximum(distance_error(some.half[:, 2], one.theta), one.least),
+        some.center,
+        np.linalg.norm(some.half, axis=1),
+        lowest[one.above],
+        one.theta,
+        one.least,
     )
     return monotone(base, left)
