@@ -100,7 +100,7 @@ class Tried:
                 break
             now.weights = Weights(1.0, float(polygons), fill)
             for number in list(now.parts):
-                self._step(now, [now.refinement(number)])
+                self._step(now, now.refinements(number))
             for source in range(now.sources):
                 self._step(now, now.proposals(source))
         return now

@@ -198,11 +198,11 @@ class Descent:
             change = change + self.billboard(left) - self.board[plane]
         return Proposal(faces, parts, joined, change)
 
-    def refinement(self, number: int) -> Proposal:
-        """A part of the mesh with as many triangles as cost least now."""
-        part = self.part(self.parts[number].faces)
-        change = part.terms - self.parts[number].terms
-        return Proposal(part.faces[:0], (part,), (number,), change)
+    def refinements(self, number: int) -> Iterator[Proposal]:
+        """A part of the mesh with each number of triangles that it may have."""
+        old = self.parts[number]
+        for part in self.choices(old.faces):
+            yield Proposal(part.faces[:0], (part,), (number,), part.terms - old.terms)
 
     def left(self, faces: Labels) -> Iterator[tuple[int, Labels]]:
         """The billboards that show any of these faces, and the pairs that they are left with."""
@@ -227,14 +227,18 @@ class Descent:
 
     def part(self, faces: Labels) -> Part:
         """A part of the mesh, with as many triangles as cost least."""
+        return min(self.choices(faces), key=lambda part: part.terms.cost(self.weights))
+
+    def choices(self, faces: Labels) -> list[Part]:
+        """A part of the mesh, with each number of triangles that it may have."""
         found = self.reduced(faces)
         area, count = found.area / self.total, len(self.part_of)
-        terms = [
-            Terms(float(e) / self.total, float(t) / count, float(a))
-            for e, t, a in zip(found.wrong, found.triangles, area, strict=True)
+        return [
+            Part(faces, surface, became, Terms(float(e) / self.total, float(t) / count, float(a)))
+            for surface, became, e, t, a in zip(
+                found.surfaces, found.became, found.wrong, found.triangles, area, strict=True
+            )
         ]
-        best = min(range(len(terms)), key=lambda nth: terms[nth].cost(self.weights))
-        return Part(faces, found.surfaces[best], found.became[best], terms[best])
 
     def reduced(self, faces: Labels) -> Reductions:
         """The reductions of a part, each made once. Borders stay while they can, or else a trunk
