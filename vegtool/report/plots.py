@@ -49,7 +49,7 @@ LOOKS: dict[str, tuple[str, str]] = {
     "octahedral": ("#8a8f94", "X"),
 }
 """Colour and marker by family."""
-OTHERS = (("#8f6bb3", "h"), ("#7a7a00", "*"), ("#a0522d", "<"), ("#2e8b8b", ">"))
+OTHERS = (("#a0522d", "<"), ("#2e8b8b", ">"), ("#b08fd0", "H"), ("#4b5d16", "8"))
 """For families that are new here, in turn."""
 HALO = 2.5
 """Points, around words."""
