@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
+from surfaces import grid_faces
 
 from vegtool.hybrid.cost import PER_BILLBOARD, Terms
 from vegtool.hybrid.greedy import Descent
@@ -41,20 +42,12 @@ def together(*plants: Plant) -> Plant:
     return replace(whole, face_material=np.concatenate(material), materials=(BARK, LEAF))
 
 
-def grid(rows: int, columns: int) -> npt.NDArray[np.int32]:
-    """(2 rows columns, 3) faces of a grid of (rows + 1) x (columns + 1) vertices."""
-    row, column = (a.ravel() for a in np.mgrid[:rows, :columns])
-    a = row * (columns + 1) + column
-    b, c, d = a + 1, a + columns + 2, a + columns + 1
-    return np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]).astype(np.int32)
-
-
 def ball(center: npt.ArrayLike = (0.0, 0.0, 0.0), rows: int = 6, columns: int = 9) -> Plant:
     """A unit sphere with a seam and a vertex for each triangle at its poles, which are welded."""
     down, around = np.mgrid[: rows + 1, : columns + 1]
     theta, phi = np.pi * down.ravel() / rows, 2 * np.pi * (around.ravel() % columns) / columns
     out = np.stack([np.sin(theta) * np.sin(phi), np.cos(theta), np.sin(theta) * np.cos(phi)], 1)
-    return mesh(out + np.asarray(center), grid(rows, columns)[:, ::-1])
+    return mesh(out + np.asarray(center), grid_faces(rows, columns)[:, ::-1])
 
 
 def tube(foot: npt.ArrayLike, radius: float, height: float, sides: int, rings: int) -> Plant:
@@ -64,7 +57,7 @@ def tube(foot: npt.ArrayLike, radius: float, height: float, sides: int, rings: i
     out = np.stack([np.sin(phi), np.zeros_like(phi), np.cos(phi)], axis=1)
     points = radius * out + np.asarray(foot, float)
     points[:, 1] += height * up.ravel() / rings
-    return mesh(points, grid(rings, sides))
+    return mesh(points, grid_faces(rings, sides))
 
 
 def leaves(count: int, seed: int = 0, size: float = 0.1) -> Plant:
@@ -94,7 +87,7 @@ def book() -> Plant:
     for turn in angle:
         out, up = (a.ravel() for a in np.mgrid[:4, :4].astype(float))
         points = np.stack([out * np.cos(turn), up, out * np.sin(turn)], axis=1)
-        pages.append(mesh(points, grid(3, 3)))
+        pages.append(mesh(points, grid_faces(3, 3)))
     return together(*pages)
 
 

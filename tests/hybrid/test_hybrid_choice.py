@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hybrid_cases import LEAF, ball, grid, mesh, together
+from hybrid_cases import LEAF, ball, mesh, together
+from surfaces import grid_faces
 
 from vegtool.convert import ConvertOptions, budget_notes, convert
 from vegtool.gl.upload import PlantBuffers
@@ -140,7 +141,7 @@ def test_open_edges_and_no_others_are_borders() -> None:
     """A square of 2 x 2 cells has a border of 8, half of two edges for each of 8 vertices."""
     positions = np.stack(np.mgrid[:3, :3], axis=-1).reshape(-1, 2)
     positions = np.concatenate([positions, np.zeros((9, 1))], axis=1)
-    length = border_lengths(grid(2, 2), positions.astype(np.float64))
+    length = border_lengths(grid_faces(2, 2), positions.astype(np.float64))
     assert length.sum() == pytest.approx(8.0)
     assert length[4] == 0 and (np.delete(length, 4) == 1.0).all()
 
@@ -148,7 +149,7 @@ def test_open_edges_and_no_others_are_borders() -> None:
 def test_open_ground_goes_below_the_triangles_of_its_border() -> None:
     """A flat square of 20 x 20 cells has 80 edges around it: two triangles show it as well."""
     row, column = (axis.ravel() for axis in np.mgrid[:21, :21])
-    ground = mesh(np.stack([column, 0 * row, row], axis=1), grid(20, 20)[:, ::-1])
+    ground = mesh(np.stack([column, 0 * row, row], axis=1), grid_faces(20, 20)[:, ::-1])
     start = begun(cloud_of(ground, 1), Weights())
     found = start.part(np.arange(len(ground.faces)))
     assert found.terms.polygons * len(ground.faces) <= 40

@@ -7,7 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hybrid_cases import ball, book, grid, mesh, together, tube
+from hybrid_cases import ball, book, mesh, together, tube
+from surfaces import grid_faces
 
 from vegtool.hybrid.cost import DISPLACED, Terms, Weights, misplaced
 from vegtool.hybrid.reduction import FEWEST, ROUGH, displaced, reductions
@@ -120,7 +121,7 @@ def test_faces_without_area_go_first() -> None:
 
 
 def test_few_triangles_stay() -> None:
-    square = surface(mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], grid(1, 1)))
+    square = surface(mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], grid_faces(1, 1)))
     assert len(square.faces) <= FEWEST
     assert reductions(square, 0.05, ("stay",)).triangles.tolist() == [2]
 

@@ -26,8 +26,7 @@ PC = Display().pixels_per_metre(1.0)
 
 
 def card(double_sided: bool) -> Plant:
-    """A metre square in the xy plane, seen from +z; red, or green from behind where that is told
-    apart by a second square just behind it."""
+    """A metre square in the xy plane, red, seen from +z, and from behind where that is asked."""
     p = np.array([[-0.5, -0.5, 0], [0.5, -0.5, 0], [0.5, 0.5, 0], [-0.5, 0.5, 0]], dtype=float)
     faces = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
     red = Material("red", base_color=np.array([1.0, 0, 0, 1]), double_sided=double_sided)

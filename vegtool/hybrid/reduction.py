@@ -15,10 +15,10 @@ import numpy as np
 
 from vegtool.arrays import FloatArray, IntArray, unit
 from vegtool.hybrid.cost import misplaced
-from vegtool.hybrid.skirt import edges_collapsed_in_skirt, open_edges, sideways
+from vegtool.hybrid.skirt import edges_collapsed_in_skirt, sideways
 from vegtool.meshes.collapse import Collapsed, carried, edges_collapsed
 from vegtool.meshes.distance import to_triangles
-from vegtool.meshes.pieces import Surface
+from vegtool.meshes.pieces import Surface, open_edges
 from vegtool.seeding import generator
 
 Borders = Literal["stay", "skirted", "free"]

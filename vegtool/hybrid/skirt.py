@@ -12,7 +12,7 @@ import numpy as np
 
 from vegtool.arrays import FloatArray, IntArray, unit
 from vegtool.meshes.collapse import Collapsed, edges_collapsed, uncollapsed
-from vegtool.meshes.pieces import Surface
+from vegtool.meshes.pieces import Surface, open_edges
 
 
 def edges_collapsed_in_skirt(
@@ -56,12 +56,3 @@ def sideways(positions: FloatArray, faces: IntArray, normals: FloatArray) -> Flo
     for end in border.T:
         np.add.at(along, end, positions[border[:, 1]] - positions[border[:, 0]])
     return unit(np.cross(along, normals))
-
-
-def open_edges(faces: IntArray) -> IntArray:
-    """(e, 2) int32 edges of one triangle alone, as it turns."""
-    edges = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
-    _, nth, uses = np.unique(
-        np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True
-    )
-    return np.asarray(edges[uses[nth.ravel()] == 1], dtype=np.int32)

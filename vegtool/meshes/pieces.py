@@ -73,3 +73,12 @@ def pieces(faces: npt.NDArray[np.integer]) -> tuple[int, IntArray]:
     _, label = connected_components(joined, directed=False)
     present, piece = np.unique(label[own[:, 0]], return_inverse=True)
     return len(present), piece.astype(np.int32)
+
+
+def open_edges(faces: IntArray) -> IntArray:
+    """(e, 2) int32 edges of one triangle alone, as it turns."""
+    edges = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
+    _, nth, uses = np.unique(
+        np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True
+    )
+    return np.asarray(edges[uses[nth.ravel()] == 1], dtype=np.int32)
