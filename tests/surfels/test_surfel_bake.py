@@ -11,7 +11,7 @@ from vegtool.gl.upload import PlantBuffers
 from vegtool.growth import sample
 from vegtool.lod import Display
 from vegtool.plant import Material, Plant
-from vegtool.surfels.bake import SurfelAtlas, baked, billboards_of
+from vegtool.surfels.bake import SurfelAtlas, baked, billboards_of, planned
 from vegtool.surfels.base import Base, base_of
 from vegtool.surfels.cuts import coarsest, drawn
 from vegtool.surfels.hierarchy import SurfelHierarchy, whole
@@ -40,7 +40,7 @@ def of(plant: Plant, least: float = 0.05) -> tuple[SurfelHierarchy, SurfelAtlas]
     base = Base(plant.corners, np.array([0]), np.zeros(1), np.zeros((1, 3)), np.ones(1))
     one = whole(base, merged(base.corners, base.first), 0.5, least)
     with PlantBuffers(plant) as buffers:
-        found = baked(buffers, base.first.astype(np.int32), one, texture_sizes(one), 1024)
+        found = baked(buffers, planned(buffers, base.first.astype(np.int32), one, 1024))
     return one, found
 
 
@@ -55,7 +55,6 @@ def test_a_texel_covers_epsilon_at_z_min() -> None:
         wide = image_size(2 * one.boxes.half[:, 0], z, PC) / epsilon
         assert (np.abs(sizes[:, 0] - wide) <= 1 + 1e-9).all()
         assert (texel_error(one.boxes.half[:, :2], sizes, z, PC) <= epsilon * (1 + 1e-9)).all()
-    assert (texture_sizes(one, 0.5) <= sizes).all() and texture_sizes(one, 0.0).max() == 1
 
 
 def test_what_is_flat_has_no_more_than_the_most() -> None:
@@ -106,9 +105,8 @@ def test_the_same_hierarchy_has_the_same_textures() -> None:
     one = reduced(base, whole(base, merged(base.corners, base.first), 0.5, 0.004))
     sizes = texture_sizes(one)
     with PlantBuffers(drawn(mt, coarsest(mt))) as buffers:
-        some, other = (
-            baked(buffers, base.first.astype(np.int32), one, sizes, 4096) for _ in range(2)
-        )
+        plan = planned(buffers, base.first.astype(np.int32), one, 4096)
+        some, other = (baked(buffers, plan) for _ in range(2))
     for name in ("color", "normal", "depth", "front", "back"):
         assert np.array_equal(getattr(some.atlas, name), getattr(other.atlas, name))
     assert (some.atlas.front[:, 2:] == sizes).all()

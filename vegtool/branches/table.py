@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import io
 import os
-import zipfile
 from pathlib import Path
 
-import numpy as np
-
 from vegtool.errors import OutputError
+from vegtool.formats.archive import archived
 from vegtool.formats.atomic import FileSet
 from vegtool.plant import Branches
-
-FIRST_DAY = (1980, 1, 1, 0, 0, 0)  # the zip format's, so that the bytes do not tell the time
 
 
 def write_branches(branches: Branches, path: Path, force: bool = False) -> None:
@@ -26,11 +21,7 @@ def write_branches(branches: Branches, path: Path, force: bool = False) -> None:
         raise OutputError(
             f"{path}: exists already. Overwrite it with -f, or name another file with --branches."
         )
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as archive:
-        for name in ("face_branch", "parent", "level"):
-            entry = io.BytesIO()
-            np.lib.format.write_array(entry, getattr(branches, name), allow_pickle=False)
-            archive.writestr(zipfile.ZipInfo(f"{name}.npy", FIRST_DAY), entry.getvalue())
+    names = "face_branch", "parent", "level"
+    data = archived({name: getattr(branches, name) for name in names})
     with FileSet(path.parent, force) as files:
-        files.add(path.name, buffer.getvalue())
+        files.add(path.name, data)

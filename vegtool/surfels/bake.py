@@ -13,17 +13,20 @@ import numpy as np
 
 from vegtool.arrays import IntArray
 from vegtool.baking.bake import dilated
-from vegtool.baking.pack import pack
+from vegtool.baking.pack import Packing, pack
 from vegtool.baking.sides import compare_sides, pictures_of
 from vegtool.gl.pictures import draw_pictures
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Atlas, Billboards
 from vegtool.surfels.hierarchy import SurfelHierarchy
+from vegtool.surfels.texture_size import texture_sizes
 
 GUTTER = 1
 """Texels around each picture: what a client filters beyond its edge. No mip is used far enough."""
 SAMPLES = 4
 """Per axis and texel."""
+BYTES_PER_TEXEL = 8
+"""Of a pair of RGBA8 textures: colour and alpha, normal and depth."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,13 +52,32 @@ def billboards_of(one: SurfelHierarchy) -> Billboards:
     )
 
 
-def baked(
-    buffers: PlantBuffers, first: IntArray, one: SurfelHierarchy, sizes: IntArray, max_side: int
-) -> SurfelAtlas:
-    """Textures of a hierarchy.
+@dataclass(frozen=True, eq=False)
+class Planned:
+    """What is to be drawn of b billboards, and where it will lie. planes: b. face, shown_by: (m,)
+    int32 faces, and which billboard shows each. behind: (b,) bool, whether anything is seen from
+    behind. own: (k,) int32 those whose back has a picture of its own. packing: of all fronts, then
+    these."""
 
-    buffers: the coarsest triangles, patch by patch. first: (p,) the first of each patch. sizes:
-    (b, 2) int32 texels. Raises CapabilityError where OpenGL cannot hold the pictures.
+    planes: Billboards
+    face: IntArray
+    shown_by: IntArray
+    behind: np.ndarray
+    own: IntArray
+    packing: Packing
+
+    @property
+    def texture_bytes(self) -> int:
+        """On the GPU, not compressed."""
+        return BYTES_PER_TEXEL * self.packing.width * self.packing.height
+
+
+def planned(buffers: PlantBuffers, first: IntArray, one: SurfelHierarchy, max_side: int) -> Planned:
+    """The pictures of a hierarchy, as large as eq. 9 has them.
+
+    buffers: the coarsest triangles, patch by patch. first: (p,) the first of each patch. max_side:
+    texels of the atlas; one that is higher is for the caller to refuse. Raises CapabilityError
+    where OpenGL cannot hold the pictures.
     """
     patch, over = one.pairs()
     count = np.diff(np.append(first, len(buffers.plant.faces)))[patch]
@@ -66,23 +88,30 @@ def baked(
     sides = compare_sides(buffers, planes, face, shown_by)
     behind = sides.back > 0
     own = np.flatnonzero(behind & sides.differ).astype(np.int32)
+    sizes = texture_sizes(one)
     packing = pack(np.concatenate([sizes, sizes[own]]), GUTTER, max_side)
-    which = np.concatenate([np.arange(len(one)), own])
-    side = np.where(np.arange(len(which)) < len(one), 1, -1)
-    number = np.full(len(one), -1, dtype=np.int32)
-    number[own] = len(one) + np.arange(len(own), dtype=np.int32)
-    back = number[shown_by] >= 0
+    return Planned(planes, face, shown_by, behind, own, packing)
+
+
+def baked(buffers: PlantBuffers, plan: Planned) -> SurfelAtlas:
+    """The textures that are planned. Raises CapabilityError where OpenGL cannot hold them."""
+    planes, own, packing = plan.planes, plan.own, plan.packing
+    count = len(planes)
+    which = np.concatenate([np.arange(count), own])
+    side = np.where(np.arange(len(which)) < count, 1, -1)
+    number = np.full(count, -1, dtype=np.int32)
+    number[own] = count + np.arange(len(own), dtype=np.int32)
+    back = number[plan.shown_by] >= 0
     drawn = draw_pictures(
         buffers,
         pictures_of(planes, which, side, packing.rect),
-        np.concatenate([face, face[back]]),
-        np.concatenate([shown_by, number[shown_by[back]]]),
+        np.concatenate([plan.face, plan.face[back]]),
+        np.concatenate([plan.shown_by, number[plan.shown_by[back]]]),
         (packing.width, packing.height),
         SAMPLES,
     )
     color, normal, _ = dilated(drawn, packing, False)
-    rect = packing.rect
-    front = rect[: len(one)]
+    front = packing.rect[:count]
     both = front.copy()
-    both[own] = rect[len(one) :]
-    return SurfelAtlas(Atlas(color, normal, drawn.depth, front, both), behind)
+    both[own] = packing.rect[count:]
+    return SurfelAtlas(Atlas(color, normal, drawn.depth, front, both), plan.behind)

@@ -16,8 +16,8 @@ MOST = 1024
 """Texels along a side: of what is flat, eq. 9 has no bound."""
 
 
-def texture_sizes(one: SurfelHierarchy, scale: float = 1.0) -> IntArray:
-    """(b, 2) int32 texels along o1 and o2, one at least. scale: of both, where memory is short."""
+def texture_sizes(one: SurfelHierarchy) -> IntArray:
+    """(b, 2) int32 texels along o1 and o2, one at least."""
     half = one.boxes.half[:, :2]
     error = np.maximum(one.error, np.finfo(float).tiny)[:, None]
-    return np.ceil(np.clip(scale * 2 * half / error, 1, MOST)).astype(np.int32)
+    return np.ceil(np.clip(2 * half / error, 1, MOST)).astype(np.int32)
