@@ -34,12 +34,14 @@ MAY_IMPORT: dict[str, set[str]] = {
     "baselines": {"formats", "baking", "gl", "measure", "meshes"},
     "hybrid": {"clustering", "boxes", "gl", "baking", "measure", "meshes", "refine"},
     "refine": {"branches", "clustering", "boxes", "gl", "baking", "lighting", "measure"},
-    "surfels": {"baking", "formats", "gl", "meshes"},
+    "surfels": {"baking", "boxes", "formats", "gl", "meshes", "refine"},
     "tiles": {
         "batch", "convert", "scene", "clustering", "boxes", "lighting", "formats", "baking", "gl",
         "measure", "refine", "tangents", "console", "workers",
     },
-    "convert": {"clustering", "boxes", "gl", "baking", "hybrid", "lighting", "measure", "refine"},
+    "convert": {
+        "clustering", "boxes", "gl", "baking", "hybrid", "lighting", "measure", "refine", "surfels",
+    },
     "workers": set(),
     "batch": {"convert", "formats", "measure", "workers"},
     "scene": {"convert", "lighting"},

@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 from time import perf_counter
 from typing import Any
 
-from vegtool.convert import ConvertOptions, convert
+from vegtool.convert import ConvertOptions, convert, endings
 from vegtool.errors import InputError, UsageError, VegtoolError, unknown
 from vegtool.formats import READERS, ReadOptions, read_plant
 from vegtool.lod import LodChain, ShadowProxy
@@ -66,6 +66,7 @@ class Task:
     depth: bool = False
     packed: bool = False
     dry_run: bool = False
+    strict: bool = False
     inputs: tuple[Path, ...] = ()
     """The other files of the batch: like a job's own, they and what lies beside them are kept."""
 
@@ -127,6 +128,7 @@ def convert_file(job: Job, task: Task, progress: Progress = silent) -> Outcome:
     sheet_name = f"{job.name}.png"
     levels, casts = 1 + task.convert.levels, task.convert.shadow_proxy is not None
     names = [*file_names(job.name, levels, task.depth, task.packed, casts), sheet_name]
+    names += [job.name + ending for ending in endings(task.convert)]
     inputs = (job.source, *task.inputs)
     check_free(task.folder, names, task.force, inputs)
     chain = convert(plant, task.convert, task.measure, lambda s, f: progress(s, 0.05 + 0.8 * f))
@@ -134,6 +136,7 @@ def convert_file(job: Job, task: Task, progress: Progress = silent) -> Outcome:
     chain = replace(chain, name=job.name, options=options)
     progress("contact sheet", 0.85)
     extra = {sheet_name: contact_sheet(chain)}
+    extra |= {job.name + ending: data for ending, data in chain.beside.items()}
     progress("writing", 0.9)
     with TemporaryDirectory() if task.dry_run else nullcontext(task.folder) as folder:
         paths = write_chain(chain, Path(folder), task.force, task.depth, extra, inputs, task.packed)
@@ -146,6 +149,10 @@ def convert_file(job: Job, task: Task, progress: Progress = silent) -> Outcome:
     ):
         notes = (*notes, _NOTHING_TO_PACK)
     missed = tuple(misses(chain.levels, task.measure))
+    if task.strict:
+        missed = (*missed, *chain.misses)
+    else:
+        notes = (*notes, *chain.misses)
     shadow = None if chain.shadow is None else _shadow_row(chain.shadow)
     return Outcome(job, files, rows, shadow, notes, missed, perf_counter() - start)
 

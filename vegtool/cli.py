@@ -109,6 +109,12 @@ def convert_command(
         ),
     ] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be made.")] = False,
+    strict: Annotated[
+        bool,
+        typer.Option(
+            "--strict", help="Exit with 4 where triangles or memory exceed what was asked for."
+        ),
+    ] = False,
     force: Force = False,
     json: Json = False,
     quiet: Quiet = False,
@@ -142,7 +148,7 @@ def convert_command(
     sources = tuple(job.source for job in todo)
     task = Task(
         out, read, convert, measure, force,
-        depth=depth, packed=packed, dry_run=dry_run, inputs=sources,
+        depth=depth, packed=packed, dry_run=dry_run, strict=strict, inputs=sources,
     )  # fmt: skip
     outcomes = []
     with console.bar("convert") as progress:

@@ -29,9 +29,10 @@ from vegtool.lod import Display, Level, LodChain
 from vegtool.measure.distances import rounded_up
 from vegtool.measure.options import MeasureOptions
 from vegtool.measure.views import distance_of
-from vegtool.options import check_limits, flag_of, option
+from vegtool.options import check_limits, flag_of, option, same_option
 from vegtool.plant import Plant
 from vegtool.progress import Progress, silent
+from vegtool.surfels.options import SurfelOptions
 from vegtool.timing import timed
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
     from vegtool.gl.pictures import BakedLight
     from vegtool.measure.scores import TruthsAt
     from vegtool.refine.level import Source
+    from vegtool.surfels.level import SurfelSource
 
 LEVEL_RATIO = 2
 """Each level has half the billboards of the one before, for half its size on the screen."""
@@ -57,6 +59,8 @@ MOST_OF_PREVIOUS = 0.75
 
 MAKING = 0.4
 """Share of the time that goes into levels that are measured, about."""
+PREPARING = 0.7
+"""Share of that which goes into a hierarchy, before there is any level."""
 
 MOST_BILLBOARDS = 100_000
 
@@ -64,8 +68,12 @@ PLAIN = ("method", "orientation_weight", "shape")
 """Options of the plain method alone."""
 
 HYBRID = "hybrid"
-OF_HYBRIDS = ("weights", "triangles", "fill", "proposals")
-"""Options of that method alone."""
+SURFELS = "surfel-billboards"
+OF_METHODS = {
+    HYBRID: ("weights", "triangles", "fill", "proposals"),
+    SURFELS: tuple(item.name for item in fields(SurfelOptions)),
+}
+"""Methods beside refinement, and options of theirs alone."""
 
 TRIANGLES_PER_BILLBOARD = 2
 """At least: four where both sides have pictures of their own."""
@@ -83,8 +91,9 @@ class ConvertOptions:
         "What clusters of --refine none are like. "
         + "; ".join(f"{k}: {v}" for k, (_, v) in METHODS.items())
         + f". Or, with --refine full, {HYBRID}: planes of which those that are dearer than the "
-        "triangles they show give way to a mesh.",
-        choices=(*METHODS, HYBRID),
+        "triangles they show give way to a mesh; {SURFELS}: a hierarchy of billboards over "
+        "triangles, of which a level has what its distance asks for.",
+        choices=(*METHODS, *OF_METHODS),
         short="m",
     )
     weights: str | None = option(
@@ -189,6 +198,10 @@ class ConvertOptions:
         most=TRIANGLES_PER_BILLBOARD * MOST_BILLBOARDS,
         metavar="TRIANGLES",
     )
+    epsilon: float = same_option(SurfelOptions, "epsilon")
+    theta: float = same_option(SurfelOptions, "theta")
+    ds_max: float = same_option(SurfelOptions, "ds_max")
+    max_texture_memory: float = same_option(SurfelOptions, "max_texture_memory")
     max_texture: int = option(
         BakeOptions().max_texture, "Largest side of an atlas, in texels.", least=16, most=16384
     )
@@ -207,16 +220,19 @@ class ConvertOptions:
     seed: int = option(0, "Seed of every random choice.", least=0)
 
     def __post_init__(self) -> None:
-        hybrid = self.method == HYBRID
+        beside = self.method in OF_METHODS
         changed = [item for item in fields(self) if getattr(self, item.name) != item.default]
         for item in changed:
-            plain = item.name in PLAIN and not (hybrid and item.name == "method")
+            plain = item.name in PLAIN and not (beside and item.name == "method")
             if plain and self.refine != "none":
                 raise UsageError(f"{flag_of(item)}: is the plain method's; add --refine none")
-            if item.name in OF_HYBRIDS and not hybrid:
-                raise UsageError(f"{flag_of(item)}: is of hybrids alone; add --method {HYBRID}")
-        if hybrid and self.refine != "full":
-            raise UsageError(f"--method {HYBRID}: goes with --refine full; leave --refine out")
+            for method, own in OF_METHODS.items():
+                if item.name in own and self.method != method:
+                    raise UsageError(
+                        f"{flag_of(item)}: is of another method alone; add --method {method}"
+                    )
+        if beside and self.refine != "full":
+            raise UsageError(f"--method {self.method}: goes with --refine full; leave --refine out")
         if self.weights is not None:
             from vegtool.hybrid.options import Weights
 
@@ -247,6 +263,11 @@ class ConvertOptions:
         """For whom distances are stated."""
         return Display(self.fov, self.image_height)
 
+    @property
+    def surfels(self) -> SurfelOptions:
+        """What shapes a hierarchy of surfel billboards."""
+        return SurfelOptions(**{name: getattr(self, name) for name in OF_METHODS[SURFELS]})
+
 
 def convert(
     plant: Plant,
@@ -273,7 +294,6 @@ def convert(
     plant = as_lit(plant, options)
     making = 1.0 if measure.measure == "off" else MAKING
     levels = [Level("mesh", mesh=plant, geometric_error_m=(0.0, 0.0))]
-    counts = billboard_counts(plant, options)
     with ExitStack() as stack:
         buffers = stack.enter_context(PlantBuffers(plant))
         under = None
@@ -285,22 +305,21 @@ def convert(
         if options.crown_normals:
             crowned = crown_normals(plant, options.crown_normals)
             baked_from = stack.enter_context(PlantBuffers(crowned))
-        make = level_maker(baked_from, truth_at, options)
-        size = options.pixels or near_pixels(counts[0])
-        first_near_m, farthest = (
-            rounded_up(distance_of(plant, options.display, pixels))
-            for pixels in (size, NEAR_LIMITS[0])
+        before = PREPARING * making if options.method == SURFELS else 0.0
+        make = level_maker(
+            baked_from, truth_at, options, progress=lambda s, f: progress(s, before * f)
         )
-        near_m = near_distances(counts, first_near_m, farthest)
-        for index, (count, near) in enumerate(zip(counts, near_m, strict=True)):
+        farthest = rounded_up(distance_of(plant, options.display, NEAR_LIMITS[0]))
+        wanted = wanted_levels(plant, options, make, farthest)
+        for index, (count, near) in enumerate(wanted):
 
             def report(stage: str, fraction: float, index: int = index) -> None:
-                done = making * (index + fraction) / len(counts)
+                done = before + (making - before) * (index + fraction) / len(wanted)
                 progress(f"LOD{index + 1}: {stage}", done)
 
             level = replace(make(count, min(near, farthest), report), near_distance_m=near)
             saves = level.triangles <= MOST_OF_PREVIOUS * levels[-1].triangles
-            if saves or (index == len(counts) - 1 and len(levels) == 1):
+            if saves or (index == len(wanted) - 1 and len(levels) == 1):
                 levels.append(level)
         shadow = None
         if options.shadow_proxy is not None:
@@ -313,7 +332,7 @@ def convert(
                 lambda casting, seen, near_m: level_maker(casting, seen, options, casts=True)(
                     most, near_m, lambda stage, _: progress(stage, making)
                 ),
-                first_near_m,
+                wanted[0][1],
             )
         kept, notes = with_distances(
             plant,
@@ -327,7 +346,14 @@ def convert(
             from vegtool.refine.reach import coverage_notes
 
             notes = (*notes, *coverage_notes(kept, truth_at))
-    notes = (*notes, *light_notes(plant, sun), *budget_notes(kept, options))
+    notes = (*notes, *light_notes(plant, sun))
+    misses, beside = budget_notes(kept, options), {}
+    if isinstance(make, SurfelLevels):
+        from vegtool.surfels.options import SUFFIX
+        from vegtool.surfels.store import surfels_bytes
+
+        model = make.made_from.model
+        misses, beside = model.notes, {SUFFIX: surfels_bytes(model)}
     progress("levels", 1.0)
     told = {**asdict(options), **asdict(measure)}
     baked = {} if sun is None else sun.as_dict()
@@ -340,7 +366,32 @@ def convert(
         notes,
         baked,
         shadow,
+        misses,
+        beside,
     )
+
+
+def wanted_levels(
+    plant: Plant, options: ConvertOptions, make: LevelMaker, farthest_m: float
+) -> list[tuple[int, float]]:
+    """Of each level, how many billboards it may have and from how many metres it is for; none from
+    farther than pictures are made for, but with fewer billboards."""
+    counts = billboard_counts(plant, options)
+    if isinstance(make, SurfelLevels) and options.pixels is None:
+        return [(count, rounded_up(make.nearest_m(count))) for count in counts]
+    size = options.pixels or near_pixels(counts[0])
+    first = rounded_up(distance_of(plant, options.display, size))
+    near_m = near_distances(counts, first, farthest_m)
+    if isinstance(make, SurfelLevels):  # as many as the error asks for, which the distance has
+        counts = [MOST_BILLBOARDS] * len(counts)
+    return list(zip(counts, near_m, strict=True))
+
+
+def endings(options: ConvertOptions) -> tuple[str, ...]:
+    """Of the names of files that are made beside the levels (LodChain.beside)."""
+    from vegtool.surfels.options import SUFFIX
+
+    return (SUFFIX,) if options.method == SURFELS else ()
 
 
 def budget_notes(levels: Sequence[Level], options: ConvertOptions) -> tuple[str, ...]:
@@ -384,9 +435,30 @@ LevelMaker = Callable[[int, float, Progress], Level]
 so many metres on."""
 
 
+@dataclass(frozen=True, eq=False)
+class SurfelLevels:
+    """Makes levels of surfel billboards."""
+
+    made_from: SurfelSource
+    options: ConvertOptions
+
+    def nearest_m(self, count: int) -> float:
+        """Metres from which so many billboards, or triangles in their place, are enough."""
+        return self.made_from.nearest_m(TRIANGLES_PER_BILLBOARD * count)
+
+    def __call__(self, count: int, near_m: float, progress: Progress = silent) -> Level:
+        from vegtool.refine.level import Wanted
+        from vegtool.surfels.level import surfel_level
+
+        most = TRIANGLES_PER_BILLBOARD * count
+        wanted = Wanted(most, near_m, self.options.max_texture, self.options.seed)
+        return surfel_level(self.made_from, wanted, progress)
+
+
 def level_maker(
-    buffers: PlantBuffers, truth_at: TruthsAt, options: ConvertOptions, casts: bool = False
-) -> LevelMaker:
+    buffers: PlantBuffers, truth_at: TruthsAt, options: ConvertOptions, casts: bool = False,
+    progress: Progress = silent,
+) -> LevelMaker:  # fmt: skip
     """What makes the levels of a plant, by `options.refine`; all that they share is made here.
 
     buffers: the plant's, without mipmaps. truth_at: what it looks like, under the light that is
@@ -407,6 +479,14 @@ def level_maker(
     source = source_of(buffers, truth_at, lit)
     if options.method == HYBRID and not casts:  # a shadow has no colours to keep
         return partial(_hybrid, source, options)
+    if options.method == SURFELS and not casts:
+        from vegtool.surfels.level import SurfelSource
+        from vegtool.surfels.make import surfel_model
+
+        model = surfel_model(
+            buffers.plant, options.surfels, options.display, options.max_texture, progress
+        )
+        return SurfelLevels(SurfelSource(source, model), options)
 
     def make(count: int, near_m: float, progress: Progress) -> Level:
         most = TRIANGLES_PER_BILLBOARD * count

@@ -6,6 +6,7 @@ set of faces that it shows; a *shape* is how many billboards show one cluster (1
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from math import radians, tan
@@ -304,6 +305,8 @@ class LodChain:
     baked: the light in the levels' colours, as plain values for the manifest; empty where clients
     light them.
     shadow: what throws the plant's shadow in place of its levels, or None.
+    misses: sentences on limits that were asked for, and could not be kept.
+    beside: further files of it, by the ending of their names.
     """
 
     name: str
@@ -314,6 +317,8 @@ class LodChain:
     notes: tuple[str, ...] = ()
     baked: dict[str, float] = field(default_factory=dict)
     shadow: ShadowProxy | None = None
+    misses: tuple[str, ...] = ()
+    beside: Mapping[str, bytes] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

@@ -188,7 +188,7 @@ def test_what_a_hybrid_cannot_be_is_a_sentence(given: dict[str, object], told: s
 
 
 def test_options_of_hybrids_are_refused_elsewhere() -> None:
-    with pytest.raises(UsageError, match="--fill: is of hybrids alone; add --method hybrid"):
+    with pytest.raises(UsageError, match="--fill: is of another method alone; add --method hybrid"):
         ConvertOptions(fill=1.0)
 
 

@@ -94,7 +94,7 @@ def test_two_colours_have_two_pictures() -> None:
         colors.append(found.atlas.color[y : y + h, x : x + w, :3].reshape(-1, 3).mean(axis=0))
         depth = found.atlas.depth[y : y + h, x : x + w].astype(int)
         assert (depth > 65000).all(), "each is half of the depth before the plane"
-    up = float(billboards_of(one).normal[0, 2])
+    up = float(billboards_of(one.boxes).normal[0, 2])
     first, second = colors if up > 0 else colors[::-1]
     assert first.argmax() == 0 and second.argmax() == 1
 

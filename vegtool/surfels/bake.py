@@ -18,6 +18,7 @@ from vegtool.baking.sides import compare_sides, pictures_of
 from vegtool.gl.pictures import draw_pictures
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Atlas, Billboards
+from vegtool.surfels.box import SurfelBoxes
 from vegtool.surfels.hierarchy import SurfelHierarchy
 from vegtool.surfels.texture_size import texture_sizes
 
@@ -38,10 +39,9 @@ class SurfelAtlas:
     behind: np.ndarray
 
 
-def billboards_of(one: SurfelHierarchy) -> Billboards:
-    """The billboards as a level has them: o1 to the right, o2 up."""
-    boxes = one.boxes
-    number = np.arange(len(one), dtype=np.int32)
+def billboards_of(boxes: SurfelBoxes) -> Billboards:
+    """Billboards as a level has them: o1 to the right, o2 up."""
+    number = np.arange(len(boxes), dtype=np.int32)
     return Billboards(
         boxes.center,
         boxes.axes[:, 0],
@@ -84,7 +84,7 @@ def planned(buffers: PlantBuffers, first: IntArray, one: SurfelHierarchy, max_si
     start = np.repeat(np.asarray(first)[patch] - np.cumsum(count) + count, count)
     face = (start + np.arange(int(count.sum()))).astype(np.int32)
     shown_by = np.repeat(over, count).astype(np.int32)
-    planes = billboards_of(one)
+    planes = billboards_of(one.boxes)
     sides = compare_sides(buffers, planes, face, shown_by)
     behind = sides.back > 0
     own = np.flatnonzero(behind & sides.differ).astype(np.int32)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from vegtool.options import option
-from vegtool.surfels.reduce import DS_MAX
 
+SUFFIX = ".surfels"
+"""Of files that hold a model (store.py)."""
 MEGABYTE = 1_000_000
 """Bytes."""
 
@@ -29,7 +30,7 @@ class SurfelOptions:
         most=1.0,
     )
     ds_max: float = option(
-        DS_MAX,
+        1.5,
         "How many times farther away a billboard is to be used than those below it; what is not "
         "goes: more is fewer billboards, and less memory.",
         least=1.0,

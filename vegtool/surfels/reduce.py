@@ -13,13 +13,13 @@ from vegtool.arrays import FloatArray
 from vegtool.surfels.base import Base
 from vegtool.surfels.box import SurfelBoxes
 from vegtool.surfels.hierarchy import SurfelHierarchy, monotone
+from vegtool.surfels.options import SurfelOptions
 from vegtool.surfels.validity import distance_error, spread
 
-DS_MAX = 1.5
-"""Mean ratio of a father's z_min to its children's, below which what is between them goes."""
 
-
-def reduced(base: Base, one: SurfelHierarchy, ds_max: float = DS_MAX) -> SurfelHierarchy:
+def reduced(
+    base: Base, one: SurfelHierarchy, ds_max: float = SurfelOptions().ds_max
+) -> SurfelHierarchy:
     """The hierarchy without what is of no use, so that a billboard's validity and its father's say
     what is drawn (select.py)."""
     left = similar_gone(base, coarser_kept(base, one), ds_max)

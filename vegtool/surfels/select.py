@@ -36,11 +36,19 @@ def top_down(one: SurfelHierarchy, eye: FloatArray, epsilon: float, pc: float) -
 def left_to_triangles(one: SurfelHierarchy, drawn: IntArray) -> Bools:
     """(p,) the patches that no billboard shows of those drawn, (m,): they are drawn as triangles,
     as fine as the multi-triangulation has it."""
-    shown = np.zeros(len(one) + 1, dtype=bool)  # the last: nothing
-    shown[drawn] = True
+    chosen = np.zeros(len(one), dtype=bool)
+    chosen[drawn] = True
+    return np.asarray(shown_below(one, chosen) < 0)
+
+
+def shown_below(one: SurfelHierarchy, chosen: Bools) -> IntArray:
+    """(p,) int32 the highest of the billboards chosen, (b,), over each patch, -1 where there is
+    none."""
+    highest = np.full(len(one) + 1, -1, dtype=np.int32)  # the last: over nothing
     for number in range(len(one) - 1, -1, -1):
-        shown[number] |= shown[one.father[number]]
-    return np.asarray(~shown[one.above])
+        over = highest[one.father[number]]
+        highest[number] = number if over < 0 and chosen[number] else over
+    return np.asarray(highest[one.above])
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,7 +29,6 @@ from vegtool.surfels.model import SurfelModel
 from vegtool.surfels.multi_triangulation import MultiTriangulation
 from vegtool.surfels.options import SurfelOptions
 
-SUFFIX = ".surfels"
 VERSION = 1
 """Of the file: one more when a reader of the last one would misread it."""
 MOST_BYTES = 2**33
