@@ -11,14 +11,15 @@ from vegtool.gl.upload import PlantBuffers
 from vegtool.growth import sample
 from vegtool.lod import Display
 from vegtool.plant import Material, Plant
-from vegtool.surfels.bake import SurfelAtlas, baked, billboards_of, planned
+from vegtool.surfels.bake import SurfelAtlas, baked, planned
 from vegtool.surfels.base import Base, base_of
 from vegtool.surfels.cuts import coarsest, drawn
-from vegtool.surfels.hierarchy import SurfelHierarchy, whole
+from vegtool.surfels.hierarchy import MOST_TEXELS, SurfelHierarchy, whole
+from vegtool.surfels.margin import MARGIN, billboards_of
 from vegtool.surfels.merging import merged
 from vegtool.surfels.multi_triangulation import multi_triangulation
 from vegtool.surfels.reduce import reduced
-from vegtool.surfels.texture_size import MOST, texture_sizes
+from vegtool.surfels.texture_size import texture_sizes
 from vegtool.surfels.validity import image_size, texel_error, z_min
 
 pytestmark = pytest.mark.gl
@@ -45,7 +46,8 @@ def of(plant: Plant, least: float = 0.05) -> tuple[SurfelHierarchy, SurfelAtlas]
 
 
 def test_a_texel_covers_epsilon_at_z_min() -> None:
-    """By equation 9 turned round; rounding up makes texels smaller, never larger."""
+    """By equation 9 turned round; rounding up makes texels smaller, never larger, and margins are
+    of a quarter of one on each side."""
     mt = multi_triangulation(sample("statue", 4000))
     base = base_of(mt)
     one = reduced(base, whole(base, merged(base.corners, base.first), 0.5, 0.002))
@@ -53,14 +55,17 @@ def test_a_texel_covers_epsilon_at_z_min() -> None:
     for epsilon in (0.5, 3.0):
         z = z_min(one.error, epsilon, PC)
         wide = image_size(2 * one.boxes.half[:, 0], z, PC) / epsilon
-        assert (np.abs(sizes[:, 0] - wide) <= 1 + 1e-9).all()
-        assert (texel_error(one.boxes.half[:, :2], sizes, z, PC) <= epsilon * (1 + 1e-9)).all()
+        assert (np.abs(sizes[:, 0] - wide) <= 1 + 2 * MARGIN + 1e-9).all()
+        drawn_half = billboards_of(one).half_size
+        assert (texel_error(drawn_half, sizes, z, PC) <= epsilon * (1 + 1e-9)).all()
 
 
 def test_what_is_flat_has_no_more_than_the_most() -> None:
     one, _ = of(card(False))
-    assert texture_sizes(one)[0].tolist() == [20, 20], "a metre over five centimetres"
-    assert texture_sizes(replace(one, error=np.zeros(1)))[0].tolist() == [MOST, MOST]
+    assert texture_sizes(one)[0].tolist() == [21, 21], "a metre over five centimetres, and margins"
+    one, _ = of(card(False), least=0.0)
+    assert texture_sizes(one)[0].tolist() == [MOST_TEXELS + 1, MOST_TEXELS + 1]
+    assert one.error[0] == pytest.approx(1 / MOST_TEXELS), "and is used where these are pixels"
 
 
 @pytest.mark.parametrize("double_sided", [True, False])
@@ -69,9 +74,10 @@ def test_the_wrong_side_is_dropped_where_nothing_is_seen(double_sided: bool) -> 
     assert found.behind.tolist() == [double_sided]
     x, y, w, h = found.atlas.front[0].tolist()
     texels = found.atlas.color[y : y + h, x : x + w]
-    assert (texels[..., 3] == 255).all() and (texels[..., 0] == 255).all()
+    assert (texels[1:-1, 1:-1, 3] == 255).all() and (texels[..., 0] == 255).all()
+    assert (texels[0, 1:-1, 3] < 255).all(), "of its margin it covers nothing"
     assert np.array_equal(found.atlas.front, found.atlas.back), "one picture serves both sides"
-    assert (found.atlas.depth[y : y + h, x : x + w] == 32768).all(), "on the plane"
+    assert (found.atlas.depth[y + 1 : y + h - 1, x + 1 : x + w - 1] == 32768).all(), "on the plane"
 
 
 def test_two_colours_have_two_pictures() -> None:
@@ -93,8 +99,9 @@ def test_two_colours_have_two_pictures() -> None:
         x, y, w, h = rect.tolist()
         colors.append(found.atlas.color[y : y + h, x : x + w, :3].reshape(-1, 3).mean(axis=0))
         depth = found.atlas.depth[y : y + h, x : x + w].astype(int)
-        assert (depth > 65000).all(), "each is half of the depth before the plane"
-    up = float(billboards_of(one.boxes).normal[0, 2])
+        before = 0.01 / billboards_of(one).half_depth[0]
+        assert np.abs(depth[1:-1, 1:-1] - 32768 * (1 + before)).max() < 2
+    up = float(billboards_of(one).normal[0, 2])
     first, second = colors if up > 0 else colors[::-1]
     assert first.argmax() == 0 and second.argmax() == 1
 

@@ -18,8 +18,8 @@ from vegtool.baking.sides import compare_sides, pictures_of
 from vegtool.gl.pictures import draw_pictures
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Atlas, Billboards
-from vegtool.surfels.box import SurfelBoxes
 from vegtool.surfels.hierarchy import SurfelHierarchy
+from vegtool.surfels.margin import billboards_of, going_on
 from vegtool.surfels.texture_size import texture_sizes
 
 GUTTER = 1
@@ -37,19 +37,6 @@ class SurfelAtlas:
 
     atlas: Atlas
     behind: np.ndarray
-
-
-def billboards_of(boxes: SurfelBoxes) -> Billboards:
-    """Billboards as a level has them: o1 to the right, o2 up."""
-    number = np.arange(len(boxes), dtype=np.int32)
-    return Billboards(
-        boxes.center,
-        boxes.axes[:, 0],
-        boxes.axes[:, 1],
-        boxes.half[:, :2],
-        boxes.half[:, 2],
-        number,
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +71,9 @@ def planned(buffers: PlantBuffers, first: IntArray, one: SurfelHierarchy, max_si
     start = np.repeat(np.asarray(first)[patch] - np.cumsum(count) + count, count)
     face = (start + np.arange(int(count.sum()))).astype(np.int32)
     shown_by = np.repeat(over, count).astype(np.int32)
-    planes = billboards_of(one.boxes)
+    planes = billboards_of(one)
+    more, over = going_on(buffers.plant, face, shown_by, planes, planes.half_depth)
+    face, shown_by = np.concatenate([face, more]), np.concatenate([shown_by, over])
     sides = compare_sides(buffers, planes, face, shown_by)
     behind = sides.back > 0
     own = np.flatnonzero(behind & sides.differ).astype(np.int32)

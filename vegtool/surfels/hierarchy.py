@@ -22,6 +22,9 @@ from vegtool.surfels.base import Base
 from vegtool.surfels.box import SurfelBoxes, boxes_of
 from vegtool.surfels.validity import distance_error
 
+MOST_TEXELS = 1024
+"""Along a side of a billboard: of what is flat, eq. 9 has no bound."""
+TINY = float(np.finfo(np.float64).tiny)
 TOGETHER = 200_000
 """Triangles whose boxes are found at once."""
 
@@ -93,10 +96,17 @@ def whole(base: Base, children: IntArray, theta: float, least: float = 0.0) -> S
     father[children[:, 0]] = father[children[:, 1]] = made
     above = np.arange(patches, dtype=np.int32)
     boxes = _boxes(base, *ancestors(above, father))
-    error = np.maximum(distance_error(boxes.half[:, 2], theta), least)
+    error = own_error(boxes, theta, least)
     radius = np.linalg.norm(boxes.half, axis=1)
     start = SurfelHierarchy(boxes, father, error, boxes.center, radius, above, theta, least)
     return monotone(base, start)
+
+
+def own_error(boxes: SurfelBoxes, theta: float, least: float) -> FloatArray:
+    """(b,) metres: of billboards by themselves (eq. 8), of which no texel may be smaller."""
+    flat = distance_error(boxes.half[:, 2], theta)
+    texel = 2 * boxes.half[:, 0] / MOST_TEXELS
+    return np.asarray(np.maximum(np.maximum(flat, texel), max(least, TINY)))
 
 
 def monotone(base: Base, one: SurfelHierarchy, growth: float = 1.0) -> SurfelHierarchy:

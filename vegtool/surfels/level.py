@@ -26,9 +26,9 @@ from vegtool.refine.color import unbiased_color
 from vegtool.refine.face_texels import face_colors
 from vegtool.refine.level import Source, Wanted, as_measured
 from vegtool.refine.mesh import ColoredMesh, joined
-from vegtool.surfels.bake import billboards_of
 from vegtool.surfels.box import SurfelBoxes, boxes_of
 from vegtool.surfels.cuts import by_error, coarsest, drawn
+from vegtool.surfels.margin import MARGIN, going_on, with_margin
 from vegtool.surfels.model import SurfelModel
 from vegtool.surfels.select import shown_below
 from vegtool.surfels.validity import spread
@@ -73,8 +73,8 @@ def cut(model: SurfelModel, delta: float) -> Cut:
 
 
 def least_error(model: SurfelModel, most: int, per_billboard: int = ONE_SIDED) -> float:
-    """Metres: the least error of which a cut has no more than so many triangles; the largest that
-    is of use, where none has."""
+    """Metres: the least error, or nearly so, of which a cut has no more than so many triangles; the
+    largest that is of use, where none has."""
     mt, one = model.triangles, model.hierarchy
     errors = np.unique([*mt.error[:-1], *(one.error / spread(one.theta))])
     low, high = 0, len(errors) - 1
@@ -121,7 +121,8 @@ def surfel_level(made_from: SurfelSource, wanted: Wanted, progress: Progress = s
         level, geometric = _baked(source, model, chosen, wanted, seconds, progress)
         if level.triangles <= wanted.triangles:
             break
-    if level.kind == "mesh":
+    # of whole surfaces, what lacks lies at the silhouette; alpha for that would open them elsewhere
+    if level.kind == "mesh" or not any(m.alpha_mode == "mask" for m in model.plant.materials):
         level = unbiased_color(level, source.truth_at(wanted.near_m))
     else:
         level = as_measured(source, wanted, level, seconds, progress)
@@ -144,13 +145,18 @@ def _baked(
     cluster[chosen.by < 0] = -1
     cluster[chosen.alone] = len(shown) + np.arange(len(chosen.alone), dtype=np.int32)
     labels = np.repeat(cluster, mt.sizes[coarsest(mt)])
-    billboards = _billboards(model, low, shown, labels)
+    density = source.truth_at.display.pixels_per_metre(wanted.near_m)
+    billboards = _billboards(model, low, shown, labels, MARGIN / density)
     level = Level("mesh", mesh=mesh, unlit=source.lit is not None) if mesh is not None else None
     if len(billboards):
-        with timed(seconds, "bake"), PlantBuffers(low) as buffers:
+        with timed(seconds, "margin"):
+            own = np.flatnonzero(labels >= 0).astype(np.int32)
+            more, over = going_on(low, own, labels[own], billboards, billboards.half_depth)
+            face = np.concatenate([own, more])
+            wide = replace(low, faces=low.faces[face], face_material=low.face_material[face])
+        with timed(seconds, "bake"), PlantBuffers(wide) as buffers:
             level = bake(
-                buffers, labels, billboards,
-                source.truth_at.display.pixels_per_metre(wanted.near_m),
+                buffers, np.concatenate([labels[own], over]), billboards, density,
                 BakeOptions(max_texture=wanted.max_texture, fit_alpha=False),
                 lambda stage, fraction: progress(stage, 0.3 + 0.3 * fraction),
                 white=mesh is not None, lit=source.lit,
@@ -164,7 +170,9 @@ def _baked(
     return level, (off[0] + chosen.error, off[1] + chosen.error)
 
 
-def _billboards(model: SurfelModel, low: Plant, shown: IntArray, labels: IntArray) -> Billboards:
+def _billboards(
+    model: SurfelModel, low: Plant, shown: IntArray, labels: IntArray, margin_m: float
+) -> Billboards:
     """Those of the hierarchy, then those of patches that have one of their own."""
     boxes = model.hierarchy.boxes
     some = SurfelBoxes(boxes.center[shown], boxes.axes[shown], boxes.half[shown])
@@ -174,7 +182,7 @@ def _billboards(model: SurfelModel, low: Plant, shown: IntArray, labels: IntArra
         alone = boxes_of(low.corners[own], first)
         both = [(getattr(some, name), getattr(alone, name)) for name in ("center", "axes", "half")]
         some = SurfelBoxes(*(np.concatenate(pair) for pair in both))
-    return billboards_of(some)
+    return with_margin(some, np.full(len(some), margin_m))
 
 
 def _mesh(source: Source, model: SurfelModel, chosen: Cut) -> Plant | None:

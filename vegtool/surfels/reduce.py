@@ -12,9 +12,9 @@ import numpy as np
 from vegtool.arrays import FloatArray
 from vegtool.surfels.base import Base
 from vegtool.surfels.box import SurfelBoxes
-from vegtool.surfels.hierarchy import SurfelHierarchy, monotone
+from vegtool.surfels.hierarchy import SurfelHierarchy, monotone, own_error
 from vegtool.surfels.options import SurfelOptions
-from vegtool.surfels.validity import distance_error, spread
+from vegtool.surfels.validity import spread
 
 
 def reduced(
@@ -35,8 +35,7 @@ def coarser_kept(base: Base, one: SurfelHierarchy) -> SurfelHierarchy:
     needed = np.zeros(len(one))
     patch, over = one.pairs()
     np.maximum.at(needed, over, base.error[patch])
-    flat = np.maximum(distance_error(one.boxes.half[:, 2], one.theta), one.least)
-    keep = flat > needed
+    keep = own_error(one.boxes, one.theta, one.least) > needed
     if len(one):
         keep |= (one.father < 0) & (needed < np.inf)
     return kept(base, one, keep)
@@ -92,7 +91,7 @@ def kept(base: Base, one: SurfelHierarchy, keep: np.ndarray) -> SurfelHierarchy:
     left = SurfelHierarchy(
         some,
         lowest[one.father[keep]],
-        np.maximum(distance_error(some.half[:, 2], one.theta), one.least),
+        own_error(some, one.theta, one.least),
         some.center,
         np.linalg.norm(some.half, axis=1),
         lowest[one.above],

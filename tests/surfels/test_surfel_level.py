@@ -1,0 +1,101 @@
+"""Levels out of a hierarchy: everything is shown once, within the error, and within the budget."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from vegtool.convert import ConvertOptions, convert
+from vegtool.errors import UsageError
+from vegtool.gl.upload import PlantBuffers
+from vegtool.growth import sample
+from vegtool.lod import Display
+from vegtool.measure.chain import views_of
+from vegtool.measure.options import MeasureOptions
+from vegtool.measure.scores import TruthsAt, scores
+from vegtool.refine.level import Wanted, source_of
+from vegtool.surfels.cuts import coarsest
+from vegtool.surfels.level import SurfelSource, cut, least_error, surfel_level
+from vegtool.surfels.make import surfel_model
+from vegtool.surfels.validity import spread
+
+pytestmark = pytest.mark.gl
+
+
+@pytest.fixture(scope="module", params=["statue", "broadleaf"])
+def made_from(request: pytest.FixtureRequest) -> Iterator[SurfelSource]:
+    plant = sample(request.param, 4000)
+    with PlantBuffers(plant) as buffers:
+        truth_at = TruthsAt(plant, views_of(MeasureOptions()), Display(), buffers)
+        yield SurfelSource(source_of(buffers, truth_at), surfel_model(plant))
+
+
+def test_a_cut_shows_every_patch_once_and_keeps_to_its_error(made_from: SurfelSource) -> None:
+    model = made_from.model
+    mt, one = model.triangles, model.hierarchy
+    source = np.flatnonzero(coarsest(mt))
+    reach = float(one.error.max()) / spread(one.theta)
+    seen = set()
+    for delta in [0.0, *np.geomspace(1e-4 * reach, 1.01 * reach, 12)]:
+        chosen = cut(model, delta)
+        shown = np.unique(chosen.by[chosen.by >= 0])
+        assert (one.error[shown] <= delta * spread(one.theta)).all()
+        assert (one.boxes.half[shown, 2] <= delta * (1 + 1e-12)).all(), "from any direction"
+        ways = (chosen.by >= 0).astype(int)
+        ways[chosen.alone] += 1
+        ways += chosen.arcs[source]
+        assert (ways <= 1).all(), "no patch twice"
+        finer = chosen.arcs & ~coarsest(mt)
+        assert (mt.error[mt.end[chosen.arcs]] <= delta).all()
+        if not finer.any():
+            assert (ways == 1).all(), "and none missing"
+        seen.add((bool(finer.any()), len(shown) > 0))
+    assert (False, True) in seen
+
+
+def test_the_least_error_of_a_budget_spends_it(made_from: SurfelSource) -> None:
+    model = made_from.model
+    for most in (10, 100, 1000):
+        error = least_error(model, most)
+        assert cut(model, error).triangles(model.triangles.sizes, 2) <= most
+        less = cut(model, np.nextafter(error, 0)).triangles(model.triangles.sizes, 2)
+        assert less > 0.97 * most, "counts fall as errors rise, nearly always"
+
+
+def test_levels_keep_to_their_budget_and_look_like_the_plant(made_from: SurfelSource) -> None:
+    plant = made_from.model.plant
+    near_m = Display().distance_m(60 / plant.extent)
+    errs = []
+    for most in (100, 400):
+        level = surfel_level(made_from, Wanted(most, near_m))
+        assert 0 < level.triangles <= most
+        truth = made_from.source.truth_at(near_m)
+        errs.append(float(scores(truth, level).values["flip"].mean()))
+        assert level.geometric_error_m is not None and level.geometric_error_m[0] < plant.radius
+    assert errs[1] < errs[0] < 0.2
+
+
+def test_a_chain_has_distances_by_its_budget() -> None:
+    """Each level has half the billboards, from where these are enough for a pixel; with a size on
+    the screen, as many as that size asks for."""
+    plant, off = sample("statue", 3000), MeasureOptions(measure="off")
+    chain = convert(plant, ConvertOptions(method="surfel-billboards", levels=3), off)
+    near = [level.near_distance_m for level in chain.levels[1:]]
+    assert all(b > a for a, b in pairwise(near)) and list(chain.beside) == [".surfels"]
+    assert (np.array([level.triangles for level in chain.levels[1:]]) <= [1024, 512, 256]).all()
+    sized = convert(plant, ConvertOptions(method="surfel-billboards", levels=2, pixels=40.0), off)
+    assert sized.levels[1].near_distance_m == pytest.approx(
+        Display().distance_m(40 / plant.extent), rel=0.01
+    )
+
+
+def test_options_of_other_methods_are_refused() -> None:
+    with pytest.raises(UsageError, match="--theta: is of another method alone; add --method surf"):
+        ConvertOptions(theta=0.3)
+    with pytest.raises(UsageError, match="--fill: is of another method alone; add --method hybrid"):
+        ConvertOptions(method="surfel-billboards", fill=0.1)
+    with pytest.raises(UsageError, match="--method surfel-billboards: goes with --refine full"):
+        ConvertOptions(method="surfel-billboards", refine="none")
