@@ -15,6 +15,7 @@ from vegtool.options import option, same_option
 FAMILIES: Mapping[str, ConvertOptions] = {
     "refined": ConvertOptions(),
     "hybrid": ConvertOptions(method="hybrid"),
+    "surfel-billboards": ConvertOptions(method="surfel-billboards"),
     **{method: ConvertOptions(refine="none", method=method) for method in METHODS},
 }
 """What is compared, and by which options `convert` makes it."""

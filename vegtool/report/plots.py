@@ -38,6 +38,7 @@ DASHED = (0, (4, 3))
 LOOKS: dict[str, tuple[str, str]] = {
     "refined": ("#8250c4", "p"),
     "hybrid": ("#8a1538", "h"),
+    "surfel-billboards": ("#2e6b2e", "d"),
     "branches": ("#009e73", "o"),
     "isodata": ("#0072b2", "s"),
     "kmeans": ("#e69f00", "^"),
