@@ -10,23 +10,25 @@ from __future__ import annotations
 
 import numpy as np
 
-from vegtool.arrays import ByteArray, FloatArray, IntArray, SingleArray
+from vegtool.arrays import ByteArray, FloatArray, IntArray, SingleArray, unit
 from vegtool.baking.dilate import nearest_covered
 from vegtool.gl.surfel_data import (
     ALIKE,
     BILLBOARD_FLOATS,
     DIFFERENT,
-    ONE_SIDED,
     SurfelData,
     SurfelItems,
     SurfelPatches,
 )
 from vegtool.surfels.bake import GUTTER
+from vegtool.surfels.base import base_of
 from vegtool.surfels.model import SurfelModel
 from vegtool.surfels.validity import spread
 
 SLACK = 2.0**-19
 """Of errors and radii: 32 roundings of single precision, where a shader makes a dozen."""
+BARELY = 0.9999
+"""Sine of nearly a right angle."""
 ALWAYS = -1.0
 """Radius of what has no error, so that no eye is within."""
 
@@ -67,14 +69,14 @@ def _unit(model: SurfelModel) -> float:
 
 def _steps(model: SurfelModel) -> FloatArray:
     """(b + n, 8) billboards, then nodes, as in SurfelData."""
-    mt, one, unit = model.triangles, model.hierarchy, _unit(model)
+    mt, one, scale = model.triangles, model.hierarchy, _unit(model)
     count = len(one)
     steps = np.zeros((count + len(mt.error), 8))
     center = np.concatenate([one.center, mt.center])
-    steps[:, :3] = ((center - model.plant.center) / unit).astype(np.float32)
-    steps[:, 3] = np.concatenate([one.radius, mt.radius]) / unit
-    steps[:count, 4:7] = one.boxes.normal * (one.boxes.half[:, 2, None] / unit)
-    steps[:, 7] = np.concatenate([one.error, mt.error]) / unit
+    steps[:, :3] = ((center - model.plant.center) / scale).astype(np.float32)
+    steps[:, 3] = np.concatenate([one.radius, mt.radius]) / scale
+    steps[:count, 4:7] = one.boxes.normal * (one.boxes.half[:, 2, None] / scale)
+    steps[:, 7] = np.concatenate([one.error, mt.error]) / scale
     steps[count:, 3][mt.error == 0] = ALWAYS
 
     source = mt.start == len(mt.error) - 1
@@ -83,7 +85,7 @@ def _steps(model: SurfelModel) -> FloatArray:
     below = np.concatenate([below, np.arange(count)])  # of a hierarchy, fathers come after children
     above = np.concatenate([above, one.father])
     has = above >= 0
-    _grown(steps, below[has], above[has], one.boxes.half[:, 2] / unit)
+    _grown(steps, below[has], above[has], one.boxes.half[:, 2] / scale)
     return steps
 
 
@@ -124,21 +126,38 @@ def _whole(steps: FloatArray, count: int) -> tuple[FloatArray, float]:
 
 
 def _quads(model: SurfelModel, billboards: SurfelItems) -> SingleArray:
-    one, textures, unit = model.hierarchy, model.textures, _unit(model)
+    one, textures, scale = model.hierarchy, model.textures, _unit(model)
     boxes, atlas = one.boxes, textures.atlas
     own = (atlas.front != atlas.back).any(axis=1)
     quads = np.zeros((len(one), BILLBOARD_FLOATS))
-    quads[:, 0:3] = (boxes.center - model.plant.center) / unit
-    quads[:, 3] = np.where(own, DIFFERENT, np.where(textures.behind, ALIKE, ONE_SIDED))
-    quads[:, 4:7] = boxes.axes[:, 0] * boxes.half[:, 0, None] / unit
-    quads[:, 7] = boxes.half[:, 2] / unit
-    quads[:, 8:11] = boxes.axes[:, 1] * boxes.half[:, 1, None] / unit
+    quads[:, 0:3] = (boxes.center - model.plant.center) / scale
+    quads[:, 3] = np.where(own, DIFFERENT, np.where(textures.behind, ALIKE, leaning(model)))
+    quads[:, 4:7] = boxes.axes[:, 0] * boxes.half[:, 0, None] / scale
+    quads[:, 7] = boxes.half[:, 2] / scale
+    quads[:, 8:11] = boxes.axes[:, 1] * boxes.half[:, 1, None] / scale
     quads[:, 11] = heights(one.father)
     quads[:, 12:15] = boxes.normal
     quads[:, 16:20], quads[:, 20:24] = atlas.front, atlas.back
     quads = quads[billboards.number]
     quads[:, 15] = billboards.above
     return quads.astype(np.float32)
+
+
+def leaning(model: SurfelModel) -> FloatArray:
+    """(b,) sine of the largest angle between a billboard's normal and that of a triangle which it
+    shows; just below 1 where a triangle faces the other way."""
+    one = model.hierarchy
+    base = base_of(model.triangles)
+    corners = base.corners
+    normal = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    patch, over = one.pairs()
+    count = np.diff(np.append(base.first, len(corners)))[patch]
+    start = np.repeat(base.first[patch] - np.cumsum(count) + count, count)
+    triangle, of = start + np.arange(len(start)), np.repeat(over, count)
+    cosine = np.einsum("ti,ti->t", normal[triangle], one.boxes.normal[of])
+    least = np.ones(len(one))
+    np.minimum.at(least, of, np.where(normal[triangle].any(axis=1), cosine, 1.0))
+    return np.asarray(np.where(least > 0, np.minimum(np.sqrt(1 - np.minimum(least, 1) ** 2), BARELY), BARELY))
 
 
 def heights(father: IntArray) -> IntArray:

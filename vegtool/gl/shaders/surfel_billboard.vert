@@ -1,10 +1,11 @@
 // A corner of a surfel billboard of one of many plants; of one that is not drawn, no place at all.
-// What is seen from behind is the picture of the back, or that of the front, or nothing.
+// What is seen from behind is the picture of the back, or that of the front, or nothing; but nearly
+// along the plane, what a closed surface shows there faces the eye in part, and would be a hole.
 #include "surfel_steps.glsl"
 #include "surfel_place.glsl"
 
 const int TEXELS = 6;  // of a billboard, see gl/surfel_data.py
-const float ONE_SIDED = 0.0, DIFFERENT = 2.0;
+const float ALIKE = 1.0, DIFFERENT = 2.0;
 
 uniform sampler2D quads;
 uniform vec2 atlas_size;  // texels
@@ -42,8 +43,10 @@ void main() {
     if (!let_through(billboard, int(normal_above.w), in_eye)) return;
     vec4 center = texel(billboard, 0), right = texel(billboard, 1), up = texel(billboard, 2);
     vec3 normal = normal_above.xyz;
-    bool behind = dot(in_eye - center.xyz, normal) < 0.0;
-    if (behind && center.w == ONE_SIDED) return;
+    vec3 to_eye = in_eye - center.xyz;
+    float above = dot(to_eye, normal);
+    if (-above > center.w * length(to_eye)) return;
+    bool behind = above < 0.0;
     bool back = behind && center.w == DIFFERENT;
     vec4 rect = texel(billboard, back ? 5 : 4);
 
@@ -58,7 +61,7 @@ void main() {
     vec3 n = turned_about_y(normal), u = turned_about_y(right.xyz), v = turned_about_y(up.xyz);
     u /= max(length(u), 1e-30);
     v /= max(length(v), 1e-30);
-    frame = mat3(u, v, back ? -n : n) * (behind && !back ? -1.0 : 1.0);
+    frame = mat3(u, v, back ? -n : n) * (behind && center.w == ALIKE ? -1.0 : 1.0);
 #ifdef PAINTED
     paint = palette[min(1 + int(up.w), PAINTED - 1)];
 #endif
