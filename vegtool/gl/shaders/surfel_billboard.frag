@@ -22,6 +22,7 @@ in vec2 uv;
 in vec2 plane;
 flat in vec2 depth;
 flat in mat3 frame;
+flat in vec3 facing;
 flat in vec3 paint;
 #ifdef READ
 in vec3 position;
@@ -58,6 +59,7 @@ void main() {
 #ifndef UNLIT
     vec3 n = frame * surface_texel.xyz;
     n /= max(length(n), 1e-12);
+    n -= 2.0 * min(dot(n, facing), 0.0) * facing;
     color.rgb = lit(Surface(color.rgb, n, vec2(1.0), 0.0, vec3(1.0)), vec3(0.0));
 #endif
     fragment = vec4(color.rgb, 1.0);

@@ -17,6 +17,7 @@ out vec2 uv;
 out vec2 plane;        // z and w of the place on the plane, as gl_Position has them
 flat out vec2 depth;   // what is added to them over the half depth
 flat out mat3 frame;   // of the normals in the picture
+flat out vec3 facing;  // unit, towards the eye, where normals are to be mirrored to it; or 0
 flat out vec3 paint;
 #ifdef READ
 out vec3 position;     // in the plant's frame and unit
@@ -34,6 +35,7 @@ void main() {
     gl_Position = NOWHERE;
     uv = plane = depth = vec2(0.0);
     frame = mat3(1.0);
+    facing = vec3(0.0);
     paint = vec3(1.0);
 #ifdef READ
     position = deep = vec3(0.0);
@@ -57,6 +59,7 @@ void main() {
     plane = gl_Position.zw;
     depth = (view_projection * vec4(in_place.w * turned_about_y(out_of), 0.0)).zw;
     uv = (rect.xy + rect.zw * (0.5 + 0.5 * at * vec2(1.0, -1.0))) / atlas_size;
+    if (behind && center.w < ALIKE) facing = turned_about_y(normalize(to_eye));
     // one picture for both sides shows normals turned to the viewer, as double-sided faces have them
     vec3 n = turned_about_y(normal), u = turned_about_y(right.xyz), v = turned_about_y(up.xyz);
     u /= max(length(u), 1e-30);
