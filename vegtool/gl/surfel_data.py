@@ -112,4 +112,4 @@ class SurfelData:
     @property
     def atlas_bytes(self) -> int:
         """Of the billboards' textures."""
-        return TEXEL_BYTES * self.color.shape[0] * self.color.shape[1]
+        return int(TEXEL_BYTES * self.color.shape[0] * self.color.shape[1])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import moderngl
@@ -84,16 +85,25 @@ def picture_of_surfels(
     parts: Parts = BOTH,
 ) -> Picture:
     """A frame as light and coverage, as `gl.draw.draw` gives them of a plant."""
-    ctx = model.ctx
+
+    def render(part: Shot) -> None:
+        draw_surfels(model, frame, part, light, samples=samples, footprint=supersample, parts=parts)
+
+    return pictured(model.ctx, shot, render, supersample, samples)
+
+
+def pictured(
+    ctx: moderngl.Context, shot: Shot, render: Callable[[Shot], None], supersample: int,
+    samples: int,
+) -> Picture:  # fmt: skip
+    """What is rendered of a shot, part by part, as light and coverage."""
     whole = np.empty((shot.height, shot.width, 4), np.float32)
     with framebuffer_kept(ctx):
         for x, y, part in tiles(ctx, shot, supersample):
             size = supersample * part.width, supersample * part.height
             drawn = drawing_target(ctx, size, samples)
             begin(drawn, size)
-            draw_surfels(
-                model, frame, part, light, samples=samples, footprint=supersample, parts=parts
-            )
+            render(part)
             pixels = resolved(ctx, drawn, (part.width, part.height), supersample, samples)
             data = pixels.frame.read((0, 0, part.width, part.height), components=4, dtype="f4")
             found = np.frombuffer(data, np.float32).reshape(part.height, part.width, 4)
@@ -158,5 +168,7 @@ def _tell(
     shader["view_projection"] = tuple(shot.view_projection.T.ravel())
     set_footprint(shader, footprint)
     set_light(shader, model.buffers, light)
-    if "palette" in shader and palette is not None:
+    if palette is not None and "palette" in shader:
         shader["palette"] = [tuple(color) for color in palette.tolist()]
+    if palette is not None and "paint" in shader:
+        shader["paint"] = tuple(palette[0].tolist())

@@ -64,8 +64,10 @@ def surfels_seen(model: SurfelBuffers, frame: SurfelFrame, shot: Shot) -> Surfel
             .reshape(shot.height, shot.width, 4)[::-1]
             for i in range(2)
         ]  # fmt: skip
-    for owned in (target, *textures, depth):
-        owned.release()
+    target.release()
+    depth.release()
+    for texture in textures:
+        texture.release()
     number = np.rint(planes[0][..., 3]).astype(np.int32)
     of = np.append(model.data.billboards.number, np.int32(-1))
     unit = np.float32(model.buffers.scale)
@@ -94,8 +96,10 @@ def shown(model: SurfelBuffers, items: SurfelItems, eyes: FloatArray, pixels: fl
         array.transform(result, moderngl.POINTS, vertices=len(items), instances=len(eyes))
         check(ctx)
     found = np.frombuffer(result.read(), np.float32).reshape(len(eyes), len(items)) > 0.5
-    for owned in (array, *given, result, nothing):
-        owned.release()
+    array.release()
+    nothing.release()
+    for buffer in (*given, result):
+        buffer.release()
     return found
 
 

@@ -157,7 +157,8 @@ def leaning(model: SurfelModel) -> FloatArray:
     cosine = np.einsum("ti,ti->t", normal[triangle], one.boxes.normal[of])
     least = np.ones(len(one))
     np.minimum.at(least, of, np.where(normal[triangle].any(axis=1), cosine, 1.0))
-    return np.asarray(np.where(least > 0, np.minimum(np.sqrt(1 - np.minimum(least, 1) ** 2), BARELY), BARELY))
+    least = np.clip(least, 0.0, 1.0)
+    return np.asarray(np.minimum(np.sqrt(1 - least * least), BARELY))
 
 
 def heights(father: IntArray) -> IntArray:

@@ -11,7 +11,7 @@ const int TEXELS = 3;
 
 uniform sampler2D vertices;  // as of PlantBuffers
 #ifdef PAINTED
-uniform vec3 palette[PAINTED];
+uniform vec3 paint;
 #endif
 
 in ivec4 in_corner;  // vertex, steps below and above, arc
@@ -48,7 +48,7 @@ void main() {
     uv = vec2(position_u.w, normal_v.w);
     vertex_color = texel(in_corner.x, 2);
 #ifdef PAINTED
-    vertex_color.rgb = palette[0];
+    vertex_color.rgb = paint;
 #endif
 #ifdef EXPOSURE
     exposure = texel(in_corner.x, 3).xy;
