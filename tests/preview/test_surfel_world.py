@@ -26,8 +26,8 @@ from vegtool.preview.scenery import IN_FULL, Look
 from vegtool.preview.surfel_forest import SurfelForest
 from vegtool.preview.surfel_world import read_surfel_world, surfel_world
 from vegtool.preview.world import read_world
-from vegtool.surfels import store
 from vegtool.surfels.make import surfel_model
+from vegtool.surfels.options import SUFFIX
 from vegtool.surfels.store import read_surfels, surfels_bytes
 
 pytestmark = pytest.mark.gl
@@ -53,7 +53,7 @@ def forest(file: Path) -> Iterator[SurfelForest]:
 
 
 def test_the_extension_is_that_of_the_file() -> None:
-    assert command.SURFELS == store.SUFFIX
+    assert command.SURFELS == SUFFIX
 
 
 def test_it_stands_where_the_model_would(file: Path, tmp_path: Path) -> None:

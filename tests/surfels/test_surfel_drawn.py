@@ -22,7 +22,7 @@ from vegtool.gl.surfel_data import SurfelData
 from vegtool.gl.surfel_read import shown
 from vegtool.growth import sample
 from vegtool.surfels.cuts import by_image_error
-from vegtool.surfels.drawn import drawn_data, heights, leaning
+from vegtool.surfels.drawn import drawn_data, heights
 from vegtool.surfels.make import surfel_model
 from vegtool.surfels.model import SurfelModel
 from vegtool.surfels.select import left_to_triangles, top_down
@@ -210,10 +210,5 @@ def test_runs_are_few_and_fall() -> None:
     assert sum(run.count for run in frame.billboards) + frame.billboards[0].first == count
 
 
-def test_how_high_and_how_far_from_its_plane() -> None:
+def test_how_high_above_the_lowest() -> None:
     assert heights(np.array([2, 2, 3, -1], np.int32)).tolist() == [0, 0, 1, 2]
-    one = surfel_model(ball(2, 0.0), display=COARSE)
-    lean = leaning(one)
-    over = one.hierarchy.pairs()[1]
-    assert lean[-1] > 0.99, "around a ball, triangles face all ways"
-    assert ((lean >= 0) & (lean < 1)).all() and lean[np.bincount(over) == 1].max() < lean[-1]

@@ -74,7 +74,7 @@ def test_a_statue_looks_like_itself(statue: tuple[SurfelModel, SurfelData]) -> N
             drawn = picture_of_surfels(surfels, what, shot, Light(), 2)
             found = score(reference(draw(truth, aimed(shot, model.plant), Light(), 2)), drawn)
             assert found["flip"] < FLIP
-            assert abs(found["coverage_bias"]) < 0.02 and found["false_holes"] < 0.02
+            assert abs(found["coverage_bias"]) < 0.04 and found["false_holes"] < 0.01
             parts = [
                 picture_of_surfels(surfels, what, shot, Light(), parts=part)[..., 3].mean()
                 for part in (Parts(True, False), Parts(False, True), Parts(False, False))
@@ -166,7 +166,7 @@ def test_the_wrong_side_is_dropped(height: float, back: float) -> None:
     for ground, seen in ((plant, False), (sides, True)):
         model = surfel_model(ground, display=COARSE)
         data, pc = drawn_data(model), COARSE.pixels_per_metre(1.0)
-        assert (data.quads[:, 3] == back).all() if seen else (data.quads[:, 3] < ALIKE).all()
+        assert (data.quads[:, 3] == back).all() if seen else not data.quads[:, 3].any()
         with SurfelBuffers(data) as surfels, PlantBuffers(ground) as truth:
             for up, drawn in ((1.0, True), (-1.0, seen)):
                 eye, _ = looking(ground, 6, pc, np.array([0.1, up, 0.1]))

@@ -15,9 +15,8 @@ from vegtool.plant import Plant
 BILLBOARD_FLOATS = 24
 """Of a billboard: center, side | half width along o1, half depth | half height along o2, level |
 normal, step above | front: x0, y0, width, height in texels | back."""
-ALIKE, DIFFERENT = 1.0, 2.0
-"""Side of a billboard of which the front's picture is seen from behind, or one of its own. Less is
-the sine of how far its triangles lean: from so far behind its plane, some still face the eye."""
+ONE_SIDED, ALIKE, DIFFERENT = 0.0, 1.0, 2.0
+"""Of a billboard, what is seen from behind: nothing, the front's picture, one of its own."""
 TEXEL_BYTES = 8
 """Of a pair of textures: colour and coverage, normal and depth."""
 

@@ -10,25 +10,24 @@ from __future__ import annotations
 
 import numpy as np
 
-from vegtool.arrays import ByteArray, FloatArray, IntArray, SingleArray, unit
+from vegtool.arrays import ByteArray, FloatArray, IntArray, SingleArray
 from vegtool.baking.dilate import nearest_covered
 from vegtool.gl.surfel_data import (
     ALIKE,
     BILLBOARD_FLOATS,
     DIFFERENT,
+    ONE_SIDED,
     SurfelData,
     SurfelItems,
     SurfelPatches,
 )
 from vegtool.surfels.bake import GUTTER
-from vegtool.surfels.base import base_of
+from vegtool.surfels.margin import billboards_of
 from vegtool.surfels.model import SurfelModel
 from vegtool.surfels.validity import spread
 
 SLACK = 2.0**-19
 """Of errors and radii: 32 roundings of single precision, where a shader makes a dozen."""
-BARELY = 0.9999
-"""Sine of nearly a right angle."""
 ALWAYS = -1.0
 """Radius of what has no error, so that no eye is within."""
 
@@ -127,38 +126,20 @@ def _whole(steps: FloatArray, count: int) -> tuple[FloatArray, float]:
 
 def _quads(model: SurfelModel, billboards: SurfelItems) -> SingleArray:
     one, textures, scale = model.hierarchy, model.textures, _unit(model)
-    boxes, atlas = one.boxes, textures.atlas
+    planes, atlas = billboards_of(one), textures.atlas
     own = (atlas.front != atlas.back).any(axis=1)
     quads = np.zeros((len(one), BILLBOARD_FLOATS))
-    quads[:, 0:3] = (boxes.center - model.plant.center) / scale
-    quads[:, 3] = np.where(own, DIFFERENT, np.where(textures.behind, ALIKE, leaning(model)))
-    quads[:, 4:7] = boxes.axes[:, 0] * boxes.half[:, 0, None] / scale
-    quads[:, 7] = boxes.half[:, 2] / scale
-    quads[:, 8:11] = boxes.axes[:, 1] * boxes.half[:, 1, None] / scale
+    quads[:, 0:3] = (planes.center - model.plant.center) / scale
+    quads[:, 3] = np.where(own, DIFFERENT, np.where(textures.behind, ALIKE, ONE_SIDED))
+    quads[:, 4:7] = planes.u * planes.half_size[:, :1] / scale
+    quads[:, 7] = planes.half_depth / scale
+    quads[:, 8:11] = planes.v * planes.half_size[:, 1:] / scale
     quads[:, 11] = heights(one.father)
-    quads[:, 12:15] = boxes.normal
+    quads[:, 12:15] = planes.normal
     quads[:, 16:20], quads[:, 20:24] = atlas.front, atlas.back
     quads = quads[billboards.number]
     quads[:, 15] = billboards.above
     return quads.astype(np.float32)
-
-
-def leaning(model: SurfelModel) -> FloatArray:
-    """(b,) sine of the largest angle between a billboard's normal and that of a triangle which it
-    shows; just below 1 where a triangle faces the other way."""
-    one = model.hierarchy
-    base = base_of(model.triangles)
-    corners = base.corners
-    normal = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-    patch, over = one.pairs()
-    count = np.diff(np.append(base.first, len(corners)))[patch]
-    start = np.repeat(base.first[patch] - np.cumsum(count) + count, count)
-    triangle, of = start + np.arange(len(start)), np.repeat(over, count)
-    cosine = np.einsum("ti,ti->t", normal[triangle], one.boxes.normal[of])
-    least = np.ones(len(one))
-    np.minimum.at(least, of, np.where(normal[triangle].any(axis=1), cosine, 1.0))
-    least = np.clip(least, 0.0, 1.0)
-    return np.asarray(np.minimum(np.sqrt(1 - least * least), BARELY))
 
 
 def heights(father: IntArray) -> IntArray:

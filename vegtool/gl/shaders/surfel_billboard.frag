@@ -7,9 +7,9 @@
 #include "soft_edges.glsl"
 #endif
 
-// Alpha is coverage, of which half would be the edge. But planes of neighbours are apart by up to
-// epsilon pixels each, as seen from the side, and of small pieces a test at a half leaves little: a
-// tree 40 pixels high has two thirds of its coverage then, and with this all of it.
+// Alpha is coverage, and half of it would be the edge. But of pieces that are smaller than a texel a
+// test at a half leaves little: a tree 40 pixels high has two thirds of its coverage then, and with
+// this all of it.
 const float CUTOFF = 0.25;
 
 // Neither has mips: a texel covers epsilon pixels where a billboard is first drawn, and by the time
@@ -22,7 +22,6 @@ in vec2 uv;
 in vec2 plane;
 flat in vec2 depth;
 flat in mat3 frame;
-flat in vec3 facing;
 flat in vec3 paint;
 #ifdef READ
 in vec3 position;
@@ -59,7 +58,6 @@ void main() {
 #ifndef UNLIT
     vec3 n = frame * surface_texel.xyz;
     n /= max(length(n), 1e-12);
-    n -= 2.0 * min(dot(n, facing), 0.0) * facing;
     color.rgb = lit(Surface(color.rgb, n, vec2(1.0), 0.0, vec3(1.0)), vec3(0.0));
 #endif
     fragment = vec4(color.rgb, 1.0);

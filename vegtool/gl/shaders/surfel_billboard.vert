@@ -1,11 +1,10 @@
 // A corner of a surfel billboard of one of many plants; of one that is not drawn, no place at all.
-// What is seen from behind is the picture of the back, or that of the front, or nothing; but nearly
-// along the plane, what a closed surface shows there faces the eye in part, and would be a hole.
+// What is seen from behind is the picture of the back, or that of the front, or nothing.
 #include "surfel_steps.glsl"
 #include "surfel_place.glsl"
 
 const int TEXELS = 6;  // of a billboard, see gl/surfel_data.py
-const float ALIKE = 1.0, DIFFERENT = 2.0;
+const float ONE_SIDED = 0.0, DIFFERENT = 2.0;
 
 uniform sampler2D quads;
 uniform vec2 atlas_size;  // texels
@@ -17,7 +16,6 @@ out vec2 uv;
 out vec2 plane;        // z and w of the place on the plane, as gl_Position has them
 flat out vec2 depth;   // what is added to them over the half depth
 flat out mat3 frame;   // of the normals in the picture
-flat out vec3 facing;  // unit, towards the eye, where normals are to be mirrored to it; or 0
 flat out vec3 paint;
 #ifdef READ
 out vec3 position;     // in the plant's frame and unit
@@ -35,7 +33,6 @@ void main() {
     gl_Position = NOWHERE;
     uv = plane = depth = vec2(0.0);
     frame = mat3(1.0);
-    facing = vec3(0.0);
     paint = vec3(1.0);
 #ifdef READ
     position = deep = vec3(0.0);
@@ -45,10 +42,8 @@ void main() {
     if (!let_through(billboard, int(normal_above.w), in_eye)) return;
     vec4 center = texel(billboard, 0), right = texel(billboard, 1), up = texel(billboard, 2);
     vec3 normal = normal_above.xyz;
-    vec3 to_eye = in_eye - center.xyz;
-    float above = dot(to_eye, normal);
-    if (-above > center.w * length(to_eye)) return;
-    bool behind = above < 0.0;
+    bool behind = dot(in_eye - center.xyz, normal) < 0.0;
+    if (behind && center.w == ONE_SIDED) return;
     bool back = behind && center.w == DIFFERENT;
     vec4 rect = texel(billboard, back ? 5 : 4);
 
@@ -59,12 +54,11 @@ void main() {
     plane = gl_Position.zw;
     depth = (view_projection * vec4(in_place.w * turned_about_y(out_of), 0.0)).zw;
     uv = (rect.xy + rect.zw * (0.5 + 0.5 * at * vec2(1.0, -1.0))) / atlas_size;
-    if (behind && center.w < ALIKE) facing = turned_about_y(normalize(to_eye));
     // one picture for both sides shows normals turned to the viewer, as double-sided faces have them
     vec3 n = turned_about_y(normal), u = turned_about_y(right.xyz), v = turned_about_y(up.xyz);
     u /= max(length(u), 1e-30);
     v /= max(length(v), 1e-30);
-    frame = mat3(u, v, back ? -n : n) * (behind && center.w == ALIKE ? -1.0 : 1.0);
+    frame = mat3(u, v, back ? -n : n) * (behind && !back ? -1.0 : 1.0);
 #ifdef PAINTED
     paint = palette[min(1 + int(up.w), PAINTED - 1)];
 #endif
