@@ -46,7 +46,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "batch": {"convert", "formats", "measure", "workers"},
     "scene": {"convert", "lighting"},
     "preview": {
-        "elements", "formats", "gl", "lighting", "measure", "scene", "tiles",
+        "elements", "formats", "gl", "lighting", "measure", "scene", "surfels", "tiles",
     },
     "stability": {
         "branches", "clustering", "boxes", "gl", "lighting", "baking", "measure", "refine",

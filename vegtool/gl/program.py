@@ -37,6 +37,18 @@ def program(ctx: moderngl.Context, vertex: str, fragment: str, *defines: str) ->
     return made[key]
 
 
+def captured(
+    ctx: moderngl.Context, vertex: str, varyings: tuple[str, ...], *defines: str
+) -> moderngl.Program:
+    """The program of a vertex shader alone, of whose outputs some are kept in a buffer."""
+    made = _programs.setdefault(ctx, {})
+    key = (vertex, "", *varyings, *defines)
+    if key not in made:
+        head = HEADER + "".join(f"#define {name}\n" for name in defines)
+        made[key] = ctx.program(vertex_shader=head + source(vertex), varyings=varyings)
+    return made[key]
+
+
 @cache
 def source(name: str) -> str:
     """The text of a shader file, its includes put in."""

@@ -26,6 +26,9 @@ SEVERAL_FILES = (".gltf", ".obj")
 READING = 0.2
 """Of the progress of what is written: reading files."""
 
+SURFELS = ".surfels"
+"""Extension of surfel billboards."""
+
 Bar = Callable[[str], AbstractContextManager[Progress]]
 """What shows progress, under a title, as long as it is open."""
 
@@ -82,7 +85,10 @@ def run_preview(
 
     tiles = tileset_at(wanted.path)
     if tiles is not None:
-        _check_tiles(wanted, options, read)
+        _check_alone(wanted, options, read, "a tileset, whose plants stand", "tiles")
+    surfels = _is_surfels(wanted.path)
+    if surfels:
+        _check_alone(wanted, options, read, "surfel billboards, which stand", "surfel billboards")
     folder, file = parts_of(wanted.path, wanted.scene)
     scene, way = None, wanted.camera
     if file is not None:
@@ -104,6 +110,10 @@ def run_preview(
         world: Place
         if tiles is not None:
             world = read_tile_world(tiles)
+        elif surfels:
+            from vegtool.preview.surfel_world import read_surfel_world
+
+            world = read_surfel_world(wanted.path, options.pixels[1])
         else:
             world = read_world(folder, file, read, part(progress, 0.0, READING))
         _tell(world, options, say)
@@ -138,6 +148,11 @@ def _check(wanted: Wanted, options: PreviewOptions, read: ReadOptions) -> None:
             "--html: writes a page of converted plants; a tileset is for viewers of 3D Tiles, and "
             "has none. Leave out --html, or name the folder of the plants"
         )
+    if wanted.html is not None and _is_surfels(wanted.path):
+        raise UsageError(
+            "--html: writes a page of converted plants, whose levels are glTF; surfel billboards "
+            "are for this window. Leave out --html, or name a folder of plants"
+        )
     if wanted.html is not None and not (plain and all(other is None for other in others)):
         raise UsageError(
             "--html: writes a page that shows converted plants by themselves; leave out all else "
@@ -152,15 +167,21 @@ def _check(wanted: Wanted, options: PreviewOptions, read: ReadOptions) -> None:
             check_free(file.parent, [file.name], wanted.force)
 
 
-def _check_tiles(wanted: Wanted, options: PreviewOptions, read: ReadOptions) -> None:
-    """Raise UsageError for what changes nothing about tiles."""
+def _check_alone(
+    wanted: Wanted, options: PreviewOptions, read: ReadOptions, is_what: str, they: str
+) -> None:
+    """Raise UsageError for what changes nothing about tiles, or surfel billboards."""
     if wanted.scene is not None or read != ReadOptions():
         raise UsageError(
-            f"{wanted.path}: is a tileset, whose plants stand where they do; leave out --scene, "
+            f"{wanted.path}: is {is_what} where they do; leave out --scene, "
             "--unit, --up and --leaf-material"
         )
     if options.fade != PreviewOptions().fade:
-        raise UsageError("--fade: tiles follow each other at once; leave it out")
+        raise UsageError(f"--fade: {they} follow each other at once; leave it out")
+
+
+def _is_surfels(path: Path) -> bool:
+    return path.suffix.lower() == SURFELS
 
 
 def _check_written(wanted: Wanted, path: CameraPath | None, inputs: list[Path]) -> None:

@@ -41,7 +41,8 @@ AS_IT_IS = Look()
 @dataclass(frozen=True)
 class FrameStats:
     """What a frame took. plants: drawn, of `total`; rows: levels drawn, fading plants twice.
-    fragments: of pixels that passed the depth test. seconds: by part."""
+    fragments: of pixels that passed the depth test. seconds: by part. said: more lines of figures.
+    """
 
     tiles: int
     plants: int
@@ -52,6 +53,7 @@ class FrameStats:
     fragments: int
     detail: float
     seconds: dict[str, float] = field(default_factory=dict)
+    said: tuple[str, ...] = ()
 
 
 class Scenery(Protocol):

@@ -105,6 +105,7 @@ class Show:
             f"{1 / mean:.1f} fps, {1e3 * mean:.1f} ms ({parts})",
             f"{stats.plants:,} of {stats.total:,} plants, {stats.tiles:,} tiles",
             f"{stats.draws:,} draws, {stats.triangles:,} triangles, {stats.fragments:,} fragments",
+            *stats.said,
             f"{self.forest.texture_bytes / 1e6:.1f} MB of textures",
             f"detail {stats.detail:.3f}"
             + (

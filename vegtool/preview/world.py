@@ -169,6 +169,30 @@ def read_world(
 def _row(species: Sequence[Species]) -> World:
     species = [placed(one)[0] for one in species]
     low, high = (np.array([one.levels[0].bounds[i] for one in species]) for i in (0, 1))
+    row = in_a_row(low, high)
+    return World(
+        tuple(species), Row(row.foot, row.width), row.terrain, row.ground, row.start, row.target
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class RowPlan:
+    """Where plants stand side by side, on what, and from where they are looked at.
+
+    foot: (n, 3) metres, of their origins. width: metres. start: the first eye. target: (3,) metres,
+    what is orbited about.
+    """
+
+    foot: FloatArray
+    width: float
+    terrain: Terrain
+    ground: GroundMesh
+    start: Eye
+    target: FloatArray
+
+
+def in_a_row(low: FloatArray, high: FloatArray) -> RowPlan:
+    """Plants with bounds (n, 3) and (n, 3) metres, whose feet are at a height of 0."""
     middle, widths = (low + high) / 2, np.ptp([low, high], axis=0)[:, [0, 2]].max(axis=1)
     ends = np.cumsum(SPACE * widths)
     foot = np.zeros_like(low)
@@ -185,9 +209,7 @@ def _row(species: Sequence[Species]) -> World:
     near, far = max(min(NEAR_M, size / 100), size / 1000), max(FAR_M, 10 * AROUND * size)
     terrain = Terrain("plane", extent=np.full(2, AROUND * size), base=-SUNK * size)
     start = Eye(eye, yaw, pitch, FOV_Y_DEG, near, far)
-    return World(
-        tuple(species), Row(foot, float(ends[-1])), terrain, _ground(terrain, 1), start, target
-    )  # fmt: skip
+    return RowPlan(foot, float(ends[-1]), terrain, _ground(terrain, 1), start, target)
 
 
 def _fitting(width: float, height: float, fov_y_deg: float) -> float:
