@@ -10,9 +10,9 @@ After Holst and Schumann, "Surfel-based billboard hierarchies for fast rendering
 
 table: their table 1, with how far what is drawn is displaced over 200 views, at distances from
 where billboards begin to sixty sides of the model; primitives drawn at five distances; and errors
-of the picture. counts: their figure 8, triangles and billboards over distance. selection: processor time
-of choosing for 1,000 instances. depth: their figure 6, by how many neighbours are looked at (k) and
-how far down boxes reach (l). linear: seconds over triangles.
+of the picture. counts: their figure 8, triangles and billboards over distance. selection: processor
+time of choosing for 1,000 instances. depth: their figure 6, by how many neighbours are looked at
+(k) and how far down boxes reach (l). linear: seconds over triangles.
 
 What is missed of what is asked is told at the end, and the exit status is then 1.
 """
@@ -40,10 +40,8 @@ from vegtool.arrays import FloatArray
 from vegtool.boxes.error import distance_to_mesh
 from vegtool.formats.png import encode
 from vegtool.gl.context import describe
-from vegtool.gl.draw import MSAA, Shot
 from vegtool.gl.surfel_buffers import SurfelBuffers
-from vegtool.gl.surfel_choice import SurfelFrame, frame_of, instances, let_through, taken
-from vegtool.gl.surfel_draw import picture_of_surfels
+from vegtool.gl.surfel_choice import frame_of, instances, let_through, taken
 from vegtool.gl.surfel_read import surfels_seen
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lighting.light import Light
@@ -51,7 +49,7 @@ from vegtool.lod import Display
 from vegtool.measure.background import bytes_over
 from vegtool.measure.metrics import reference, score
 from vegtool.measure.pictures import truth
-from vegtool.measure.views import Camera, around, views
+from vegtool.measure.views import around, views
 from vegtool.plant import Plant
 from vegtool.surfels.bake import BYTES_PER_TEXEL
 from vegtool.surfels.base import base_of
@@ -62,6 +60,7 @@ from vegtool.surfels.merging import merged
 from vegtool.surfels.model import SurfelModel
 from vegtool.surfels.multi_triangulation import multi_triangulation
 from vegtool.surfels.options import MEGABYTE, SurfelOptions
+from vegtool.surfels.pictures import framed, pictured
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "methods" / "surfel_billboards.md"
@@ -127,18 +126,6 @@ class Bench:
         )
         return triangles, int(let_through(data.billboards, found).sum())
 
-    def seen(self, camera: Camera) -> tuple[SurfelFrame, Shot]:
-        rows = instances(
-            self.buffers.data, camera.eye, np.zeros((1, 3)), np.zeros(1), np.ones(1)
-        )  # fmt: skip
-        moved = np.eye(4)
-        moved[:3, 3] = camera.eye - camera.target
-        shot = Shot(camera.view_projection() @ moved, camera.eye, camera.width, camera.height)
-        return frame_of(self.buffers.data, rows, self.pixels), shot
-
-    def picture(self, camera: Camera, light: Light) -> np.ndarray:
-        return picture_of_surfels(self.buffers, *self.seen(camera), light, samples=MSAA)
-
     def displaced(self, rng: np.random.Generator) -> FloatArray:
         """(n,) pixels, of points that billboards draw: from where they are drawn to the surface in
         their texture, and from there to the original, of which that is a bound."""
@@ -148,7 +135,7 @@ class Bench:
             direction /= np.linalg.norm(direction)
             sides = BEGIN * (END / BEGIN) ** rng.random()
             camera = around(plant.positions, direction, sides * self.side, self.model.display)
-            found = surfels_seen(self.buffers, *self.seen(camera))
+            found = surfels_seen(self.buffers, *framed(self.buffers.data, self.model, camera))
             at = np.argwhere(found.billboard >= 0)
             at = at[rng.permutation(len(at))[:POINTS]]
             if not len(at):
@@ -174,7 +161,9 @@ class Bench:
                     camera = around(plant.positions, view.direction, away, self.model.display)
                     light = Light(view.sun)
                     true = reference(truth(original, camera, light))
-                    errs.append(score(true, self.picture(camera, light))["flip"])
+                    errs.append(
+                        score(true, pictured(self.buffers, self.model, camera, light))["flip"]
+                    )
                 found.append(float(np.mean(errs)))
         return found
 
@@ -395,7 +384,10 @@ def pictures(name: str, folder: Path) -> None:
             away = on.model.display.distance_m(pixels / plant.extent)
             camera = around(plant.positions, view.direction, away, on.model.display)
             light, pair = Light(view.sun), []
-            for each in (truth(original, camera, light), on.picture(camera, light)):
+            for each in (
+                truth(original, camera, light),
+                pictured(on.buffers, on.model, camera, light),
+            ):
                 times = max(int(400 / pixels), 1)
                 pair.append(np.kron(bytes_over(each), np.ones((times, times, 1), np.uint8)))
             columns.append(np.concatenate(pair, axis=0))

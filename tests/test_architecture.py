@@ -34,7 +34,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "baselines": {"formats", "baking", "gl", "measure", "meshes"},
     "hybrid": {"clustering", "boxes", "gl", "baking", "measure", "meshes", "refine"},
     "refine": {"branches", "clustering", "boxes", "gl", "baking", "lighting", "measure"},
-    "surfels": {"baking", "boxes", "formats", "gl", "meshes", "refine"},
+    "surfels": {"baking", "boxes", "formats", "gl", "lighting", "measure", "meshes", "refine"},
     "tiles": {
         "batch", "convert", "scene", "clustering", "boxes", "lighting", "formats", "baking", "gl",
         "measure", "refine", "tangents", "console", "workers",

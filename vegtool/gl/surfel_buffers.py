@@ -5,7 +5,7 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 
-from vegtool.arrays import SingleArray
+from vegtool.arrays import ByteArray, SingleArray
 from vegtool.gl.context import OnGpu
 from vegtool.gl.pace import Pace
 from vegtool.gl.surfel_choice import SURFEL_INSTANCE, Run, SurfelFrame
@@ -66,6 +66,10 @@ class SurfelBuffers(OnGpu):
     def texture_bytes(self) -> int:
         """Of the billboards' textures and the materials', mips counted."""
         return self.data.atlas_bytes + self.buffers.texture_bytes
+
+    def repaint(self, color: ByteArray) -> None:
+        """Other colours in the billboards' pictures, (h, w, 4) as they were."""
+        self._color.write(np.ascontiguousarray(color))
 
     def write(self, rows: np.ndarray) -> None:
         """Tell of the instances of a frame, (n,) SURFEL_INSTANCE."""

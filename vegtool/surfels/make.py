@@ -7,6 +7,7 @@ the texels, and triangles show the same without any. No error in the picture gro
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import sqrt
 
 import numpy as np
@@ -20,6 +21,7 @@ from vegtool.plant import Plant
 from vegtool.progress import Progress, part_of, silent
 from vegtool.surfels.bake import BYTES_PER_TEXEL, Planned, baked, planned
 from vegtool.surfels.base import Base, base_of
+from vegtool.surfels.coverage import covered_alike
 from vegtool.surfels.cuts import by_error, coarsest, drawn, triangles
 from vegtool.surfels.hierarchy import SurfelHierarchy, whole
 from vegtool.surfels.merging import merged
@@ -78,11 +80,14 @@ def surfel_model(
         progress("textures", 0.8)
         with timed(seconds, "textures"):
             textures = baked(buffers, plan)
+    found = SurfelModel(mt, one, textures, display, options)
+    with timed(seconds, "coverage"):
+        found = covered_alike(found, part_of(progress, 0.85, 0.15))
     notes: tuple[str, ...] = ()
     if least > asked:
         notes = (_begins_farther(mt, options, asked, least, m_per_pixel, limit),)
     progress("surfel billboards", 1.0)
-    return SurfelModel(mt, one, textures, display, options, notes, seconds)
+    return replace(found, notes=notes, seconds=seconds)
 
 
 def _planned(

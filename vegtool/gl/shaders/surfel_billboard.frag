@@ -7,10 +7,8 @@
 #include "soft_edges.glsl"
 #endif
 
-// Alpha is coverage, and half of it would be the edge. But of pieces that are smaller than a texel a
-// test at a half leaves little: a tree 40 pixels high has two thirds of its coverage then, and with
-// this all of it.
-const float CUTOFF = 0.25;
+// Alpha is such that as much passes as is covered (surfels/coverage.py).
+const float CUTOFF = 0.5;
 
 // Neither has mips: a texel covers epsilon pixels where a billboard is first drawn, and by the time
 // that it is much smaller, its father is drawn. Only what has no father shrinks further, and that

@@ -1,0 +1,66 @@
+"""Alpha such that billboards cover what the plant covers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vegtool.gl.surfel_buffers import SurfelBuffers
+from vegtool.gl.upload import PlantBuffers
+from vegtool.growth import sample
+from vegtool.measure.pictures import truth
+from vegtool.measure.views import around, views
+from vegtool.surfels.coverage import MOST, covered_alike
+from vegtool.surfels.drawn import drawn_data
+from vegtool.surfels.make import surfel_model
+from vegtool.surfels.model import SurfelModel
+from vegtool.surfels.pictures import pictured
+
+pytestmark = pytest.mark.gl
+
+
+@pytest.fixture(scope="module")
+def statue() -> SurfelModel:
+    return surfel_model(sample("statue", 3000))
+
+
+def bias(model: SurfelModel, pixels: float) -> float:
+    """Of what is covered, as a share, from views that nothing was solved by."""
+    plant, found, wanted = model.plant, 0.0, 0.0
+    away = model.display.distance_m(pixels / plant.extent)
+    with PlantBuffers(plant) as original, SurfelBuffers(drawn_data(model)) as surfels:
+        for view in views("all", 6, 0.5):
+            camera = around(plant.positions, view.direction, away, model.display)
+            wanted += float(truth(original, camera)[..., 3].sum())
+            found += float(pictured(surfels, model, camera)[..., 3].sum())
+    return found / wanted - 1
+
+
+def thinned(model: SurfelModel) -> SurfelModel:
+    """With a third of its alpha, so that hardly anything passes the test."""
+    atlas = model.textures.atlas
+    color = atlas.color.copy()
+    color[..., 3] //= 3
+    textures = replace(model.textures, atlas=replace(atlas, color=color))
+    return replace(model, textures=textures)
+
+
+def test_what_is_lost_to_the_test_is_won_back(statue: SurfelModel) -> None:
+    thin = thinned(statue)
+    solved = covered_alike(thin)
+    for pixels in (60.0, 30.0):
+        assert bias(thin, pixels) < -0.9
+        assert abs(bias(solved, pixels)) < 0.06
+        assert abs(bias(statue, pixels)) < 0.06
+
+
+def test_alpha_only_grows_and_colours_stay(statue: SurfelModel) -> None:
+    before = thinned(statue)
+    after = covered_alike(before).textures.atlas
+    old = before.textures.atlas
+    assert (after.color[..., 3] >= old.color[..., 3]).all()
+    assert (after.color[..., 3] <= np.ceil(MOST * old.color[..., 3].astype(float))).all()
+    assert np.array_equal(after.color[..., :3], old.color[..., :3])
+    assert np.array_equal(before.textures.atlas.color, thinned(statue).textures.atlas.color)
