@@ -53,9 +53,18 @@ def plant_glb(plant: Plant) -> bytes:
     return writer.document.glb()
 
 
-def plant_document(plant: Plant, name: str) -> Document:
-    """A plant as the objects of a .glb file whose node is called `name`, without its branches."""
-    writer = _Writer(_local_origin(plant.bounds), {})
+def plant_document(
+    plant: Plant,
+    name: str,
+    origin: FloatArray | None = None,
+    beside: Mapping[int, str] | None = None,
+) -> Document:
+    """A plant as the objects of a .glb file whose node is called `name`, without its branches.
+
+    origin: (3,) metres, which vertices are relative to; None where the file is to choose. beside:
+    URIs of pictures that are files of their own, by the id of their texture or pixels.
+    """
+    writer = _Writer(_local_origin(plant.bounds) if origin is None else origin, {}, beside)
     writer.document.show(writer.add_plant(plant, name))
     return writer.document
 
@@ -182,10 +191,13 @@ def screen_coverage(chain: LodChain) -> list[float]:
 class _Writer:
     """Puts levels into one document, relative to one origin; each image goes in once."""
 
-    def __init__(self, origin: FloatArray, images: EncodedImages) -> None:
+    def __init__(
+        self, origin: FloatArray, images: EncodedImages, beside: Mapping[int, str] | None = None
+    ) -> None:
         self.document = Document()
         self._origin = origin
         self._images = images
+        self._beside = beside or {}
         self._textures: dict[int, int] = {}
         self._samplers: dict[int, int] = {}
 
@@ -352,24 +364,30 @@ class _Writer:
         return {"extensions": {name: values or {}}}
 
     def _add_texture(self, texture: Texture) -> int:
-        if id(texture) not in self._images:
+        if id(texture) not in self._images and id(texture) not in self._beside:
             self._images[id(texture)] = png.encode_texture(texture)
         return self._add_image(id(texture), texture.name, _REPEAT)
 
     def _add_pixels(self, pixels: npt.NDArray[np.uint8], name: str) -> int:
-        if id(pixels) not in self._images:
+        if id(pixels) not in self._images and id(pixels) not in self._beside:
             self._images[id(pixels)] = (png.encode(pixels), "image/png")
         return self._add_image(id(pixels), name, _CLAMP_TO_EDGE)
 
     def _add_image(self, key: int, name: str, wrap: int) -> int:
-        """A texture that shows the encoded image `key`; the same one for the same key."""
+        """A texture that shows the image `key`, encoded or beside the file; the same one for the
+        same key."""
         if key not in self._textures:
-            data, mime_type = self._images[key]
-            view = self.document.add_view(data)
-            source = self.document.add("images", name=name, mimeType=mime_type, bufferView=view)
+            source = self.document.add("images", name=name, **self._image(key))
             sampler = self._add_sampler(wrap)
             self._textures[key] = self.document.add("textures", source=source, sampler=sampler)
         return self._textures[key]
+
+    def _image(self, key: int) -> dict[str, Any]:
+        """Where it is."""
+        if key in self._beside:
+            return {"uri": self._beside[key]}
+        data, mime_type = self._images[key]
+        return {"mimeType": mime_type, "bufferView": self.document.add_view(data)}
 
     def _add_sampler(self, wrap: int) -> int:
         if wrap not in self._samplers:

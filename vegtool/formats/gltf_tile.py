@@ -1,5 +1,5 @@
-"""Tiles of a landscape as .glb files: merged groups, instances of models that tiles share, and
-squares that were clustered anew.
+"""Tiles as .glb files: of a landscape, merged groups, instances of models that tiles share, and
+squares that were clustered anew; of one plant, parts of its billboards and of its surface.
 
 Sources: glTF 2.0 specification; KHR_mesh_quantization and EXT_mesh_gpu_instancing (extensions,
 Khronos glTF repository). Textures of merged groups, and the vertices of instanced models, are files
@@ -9,7 +9,7 @@ are in metres from the tile's centre.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +19,7 @@ import numpy.typing as npt
 from vegtool.arrays import ByteArray, FloatArray
 from vegtool.formats import png
 from vegtool.formats.glb import ELEMENT_ARRAY_BUFFER, Document
+from vegtool.formats.gltf import plant_document
 from vegtool.formats.gltf_material import UNLIT
 from vegtool.formats.plant_table import (
     PlantTable,
@@ -29,6 +30,7 @@ from vegtool.formats.plant_table import (
 )
 from vegtool.formats.shared_model import SharedModel
 from vegtool.lod import Triangles
+from vegtool.plant import Plant
 
 QUANTIZATION, INSTANCING = "KHR_mesh_quantization", "EXT_mesh_gpu_instancing"
 STEPS = 65535
@@ -128,6 +130,36 @@ def far_glb(
         "material": _material(document, name, images, True, unlit),
     }
     return _shown(document, primitive, name, placed)
+
+
+def part_glb(
+    quads: Triangles | None,
+    sheet: SheetFiles,
+    mesh: Plant | None,
+    beside: Mapping[int, str],
+    name: str,
+) -> bytes:
+    """A part of a plant: one node, one mesh; billboards are one primitive with one material, and
+    so is each material of the mesh beside them. Vertices are floats, so that parts meet.
+
+    beside: URIs of the mesh's pictures, by the id of their texture or pixels. Raises ValueError for
+    neither quads nor mesh.
+    """
+    primitives: list[dict[str, Any]] = []
+    document = Document()
+    if mesh is not None:
+        document = plant_document(mesh, name, np.zeros(3), beside)
+        primitives = document.objects["meshes"][0]["primitives"]
+    if quads is not None:
+        images = [None if uri is None else {"uri": uri} for uri in (sheet.color, sheet.normal)]
+        attributes = _plain(document, quads, sheet.color is not None, sheet.normal is not None)
+        material = _material(document, name, images, sheet.double_sided, sheet.unlit)
+        primitives.append({"attributes": attributes, **_indices(document, quads), "material": material})
+    if mesh is None:
+        if quads is None:
+            raise ValueError("part_glb: expected quads or a mesh")
+        return _shown(document, primitives[0], name, {})
+    return document.glb()
 
 
 def _indices(document: Document, group: Triangles) -> dict[str, int]:

@@ -43,19 +43,28 @@ class TileEntry:
     children: Sequence[TileEntry] = ()
 
 
-def tileset_files(root: TileEntry, placed: FloatArray | None) -> dict[str, bytes]:
+def tileset_files(
+    root: TileEntry,
+    placed: FloatArray | None,
+    seen_px: float = CLIENT_PX,
+    gone_m: float | None = None,
+) -> dict[str, bytes]:
     """TILESET and, where there are many tiles, others that it refers to, beside the tiles.
 
     placed: (4, 4) from the scene's frame, z up, to the earth's; None where it has no place there.
-    Where the root is in the scene's frame, y up, is among its extras: origin_m.
+    Where the root is in the scene's frame, y up, is among its extras: origin_m. seen_px: pixels
+    that errors are to be seen as; what clients have not unless told so is among them, too. gone_m:
+    metres, the error of showing nothing; twice the root's if None.
     """
     base = np.eye(4) if placed is None else placed
     files: dict[str, bytes] = {}
     apart = APART if _count(root) > MOST else None
     top = _tile(root, "", apart, 0, files)
     top["extras"]["origin_m"] = root.origin.tolist()
+    if seen_px != CLIENT_PX:
+        top["extras"]["seen_px"] = seen_px
     top["transform"] = _columns(base @ _translation(root.origin))
-    files[TILESET] = _file(top, root)
+    files[TILESET] = _file(top, 2 * root.error_m if gone_m is None else gone_m)
     return files
 
 
@@ -63,11 +72,11 @@ def _count(tile: TileEntry) -> int:
     return 1 + sum(map(_count, tile.children))
 
 
-def _file(top: dict[str, Any], root: TileEntry) -> bytes:
-    """A tileset's own error is twice its root's: it is not drawn where it has none."""
+def _file(top: dict[str, Any], gone_m: float) -> bytes:
+    """gone_m: the tileset's own error. It is not drawn where it has none."""
     values = {
         "asset": {"version": "1.1", "generator": f"vegtool {vegtool.__version__}"},
-        "geometricError": 2 * root.error_m or 1.0,
+        "geometricError": gone_m or 1.0,
         "root": {**top, "refine": "REPLACE"},
     }
     return (json.dumps(values, allow_nan=False, separators=(",", ":")) + "\n").encode()
@@ -95,7 +104,7 @@ def _tile(
             path = PurePosixPath(child.uri).with_suffix(".json")
             within = f"{path.parent}/"
             top = _tile(child, within, apart, depth + 1, files)
-            files[str(path)] = _file(top, child)
+            files[str(path)] = _file(top, 2 * child.error_m)
             told = {key: top[key] for key in ("boundingVolume", "geometricError", "extras")}
             refers = {"content": {"uri": str(path).removeprefix(folder)}}
             children.append({**place, **told, **refers})

@@ -12,7 +12,6 @@ from time import perf_counter
 import numpy as np
 
 from vegtool.arrays import Picture
-from vegtool.formats.tileset import CLIENT_PX
 from vegtool.gl.context import OnGpu
 from vegtool.gl.draw import MSAA
 from vegtool.gl.instances import INSTANCE, WHOLE
@@ -104,7 +103,7 @@ class TileForest(OnGpu):
             front, low, high = front[seen], low[seen], high[seen]
             near = np.maximum(np.linalg.norm(np.clip(0.0, low, high), axis=1), NEAREST_M)
             pixels = look.detail * tiles.error_m[front] * eye.focal_px(size[1]) / near
-            refined: np.ndarray = np.asarray(pixels > CLIENT_PX)
+            refined: np.ndarray = np.asarray(pixels > tiles.seen_px)
             if look.level is not None:  # 0 is the finest
                 refined = tiles.depth[front] < tiles.deepest - look.level
             first, end = tiles.children[front].T

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from vegtool.arrays import FloatArray
-from vegtool.formats.tileset import CLIENT_PX
 from vegtool.gl.landscape import GroundMesh
 from vegtool.lighting.light import Sun
 from vegtool.preview.eye import Eye, towards
@@ -53,7 +52,7 @@ class TileWorld:
         for depth in range(tiles.deepest + 1):
             here = tiles.shown & (tiles.depth == depth)
             if here.any():
-                away = tiles.error_m[here].max() * focal_px / CLIENT_PX
+                away = tiles.error_m[here].max() * focal_px / tiles.seen_px
                 level, count = tiles.deepest - depth, int(here.sum())
                 found.append(f"level {level}: {count:,} tiles, drawn from {away:,.3g} m")
         return found

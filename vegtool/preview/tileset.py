@@ -23,7 +23,7 @@ from vegtool.formats import read_plant
 from vegtool.formats.beside import find_beside
 from vegtool.formats.gltf_data import GltfFile, open_gltf
 from vegtool.formats.gltf_tile import INSTANCING
-from vegtool.formats.tileset import TILESET
+from vegtool.formats.tileset import CLIENT_PX, TILESET
 from vegtool.plant import Plant
 
 LongArray = npt.NDArray[np.int64]
@@ -46,6 +46,7 @@ class Tileset:
     origin: (t, 3) metres. low, high: (t, 3) metres, of their boxes. error_m: (t,). children: (t, 2)
     int64, the first of each, and the one after the last. plants: (t,) int64, that stand on each.
     feet_m: (t, 2), the lowest and highest of their feet. depth: (t,) int64, of each below the root.
+    seen_px: pixels that errors are to be seen as.
     """
 
     file: tuple[str | None, ...]  # half a million paths would take seconds
@@ -57,6 +58,7 @@ class Tileset:
     plants: LongArray
     feet_m: FloatArray
     depth: LongArray
+    seen_px: float = CLIENT_PX
 
     @cached_property
     def shown(self) -> np.ndarray:
@@ -143,7 +145,7 @@ class _Outside:
 @dataclass(frozen=True, eq=False)
 class _Part:
     """The n tiles of one file. number: (n,) int64 among all. end: the number after those that they
-    and their children have. feet_m: as told. Others as of Tileset."""
+    and their children have. feet_m, seen_px: as told. Others as of Tileset."""
 
     number: LongArray
     file: list[str | None]
@@ -157,6 +159,7 @@ class _Part:
     depth: LongArray
     outside: list[_Outside]
     end: int
+    seen_px: float
 
 
 def _part(at: _Outside, free: int) -> _Part:
@@ -203,6 +206,9 @@ def _tiles_of(at: _Outside, root: dict[str, Any], free: int) -> _Part:
         for child in below:
             found.append((child, free, _moved(origin, child["transform"]), depth + 1))
             free += 1
+    seen_px = float(root["extras"].get("seen_px", CLIENT_PX))
+    if not 0 < seen_px < float("inf"):
+        raise ValueError(f"errors to be seen as {seen_px:g} pixels")
     boxes = _numbers([tile["boundingVolume"]["box"] for tile, _, _ in shown], 12)
     origins = _numbers([origin for _, _, origin in shown], 3)
     center = origins + boxes[:, [0, 2, 1]] * [1, 1, -1]
@@ -221,6 +227,7 @@ def _tiles_of(at: _Outside, root: dict[str, Any], free: int) -> _Part:
         numbers[:, 1],
         outside,
         free,
+        seen_px,
     )
 
 
@@ -260,6 +267,7 @@ def _joined(parts: Sequence[_Part]) -> Tileset:
         joined("plants"),
         joined("feet_m"),
         joined("depth"),
+        parts[0].seen_px,
     )
 
 
