@@ -37,7 +37,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "surfels": {"baking", "boxes", "formats", "gl", "lighting", "measure", "meshes", "refine"},
     "tiles": {
         "batch", "convert", "scene", "clustering", "boxes", "lighting", "formats", "baking", "gl",
-        "measure", "refine", "tangents", "console", "workers",
+        "measure", "refine", "surfels", "tangents", "console", "workers",
     },
     "convert": {
         "clustering", "boxes", "gl", "baking", "hybrid", "lighting", "measure", "refine", "surfels",

@@ -403,17 +403,22 @@ def preview_command(
 def tiles_command(
     *,
     source: Annotated[
-        Path, typer.Argument(help="A scene, or an inventory with a row per plant.", parser=_path)
-    ],
-    species: Annotated[
         Path,
-        typer.Option(
-            "--species",
-            help="Folder of plants, converted or models.",
-            metavar="FOLDER",
+        typer.Argument(
+            help="A scene, an inventory with a row per plant, or the surfel billboards of one "
+            "plant (NAME.surfels).",
             parser=_path,
         ),
     ],
+    species: Annotated[
+        Path | None,
+        typer.Option(
+            "--species",
+            help="Folder of a landscape's plants, converted or models.",
+            metavar="FOLDER",
+            parser=_path,
+        ),
+    ] = None,
     out: Out,
     tiles: TileOptions,
     jobs: Annotated[
@@ -450,13 +455,15 @@ def tiles_command(
     verbose: Verbose = 0,
     config: Config = None,
 ) -> None:
-    """Merge a landscape of plants into tiles, each drawn by one call, for 3D Tiles clients.
+    """Merge a landscape of plants, or make one plant, into tiles for 3D Tiles clients.
 
     [bold]Examples[/bold]
 
         vegtool tiles trees.csv --species library/ -o tiles/
 
         vegtool tiles scene.toml --species library/ -o tiles/ --dry-run
+
+        vegtool tiles oak.surfels -o oak/
 
         vegtool preview tiles/
     """

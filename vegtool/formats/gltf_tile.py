@@ -53,12 +53,14 @@ MASKED = {"alphaMode": "MASK", "alphaCutoff": 0.5}
 class SheetFiles:
     """Where a group's textures are, relative to the tile: color, and normal or None; None for both
     where all is opaque in the colours of its vertices. And of its material whether it is drawn from
-    both sides, and whether light is in its colours."""
+    both sides, whether light is in its colours, and whether clients are to average textures where
+    these are seen smaller than they are."""
 
     color: str | None
     normal: str | None
     double_sided: bool
     unlit: bool = False
+    averaged: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,8 +155,11 @@ def part_glb(
     if quads is not None:
         images = [None if uri is None else {"uri": uri} for uri in (sheet.color, sheet.normal)]
         attributes = _plain(document, quads, sheet.color is not None, sheet.normal is not None)
-        material = _material(document, name, images, sheet.double_sided, sheet.unlit)
-        primitives.append({"attributes": attributes, **_indices(document, quads), "material": material})
+        material = _material(
+            document, name, images, sheet.double_sided, sheet.unlit, sheet.averaged
+        )
+        indices = _indices(document, quads)
+        primitives.append({"attributes": attributes, **indices, "material": material})
     if mesh is None:
         if quads is None:
             raise ValueError("part_glb: expected quads or a mesh")
@@ -301,6 +306,7 @@ def _material(
     images: Sequence[dict[str, Any] | None],
     double_sided: bool,
     unlit: bool,
+    averaged: bool = True,
 ) -> int:
     """images: of colours and of normals, or None; without any, what is drawn is opaque. Pictures
     have neighbours, or edges."""
@@ -308,8 +314,8 @@ def _material(
     more: dict[str, Any] = _unlit(document) if unlit else {}
     if any(images):
         sampler = document.add(
-            "samplers", magFilter=LINEAR, minFilter=LINEAR_MIPMAP_LINEAR, wrapS=CLAMP_TO_EDGE,
-            wrapT=CLAMP_TO_EDGE,
+            "samplers", magFilter=LINEAR, minFilter=LINEAR_MIPMAP_LINEAR if averaged else LINEAR,
+            wrapS=CLAMP_TO_EDGE, wrapT=CLAMP_TO_EDGE,
         )  # fmt: skip
         color, normal = (
             {"index": document.add("textures", source=document.add("images", **image),

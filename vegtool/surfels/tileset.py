@@ -1,14 +1,18 @@
 """A model of surfel billboards as a 3D Tiles tileset: its parts, and the pictures that they share.
 
-Source: OGC 22-025r4, 3D Tiles 1.1. A tile's geometric error is the largest d sqrt(theta (2 - theta))
-of its billboards, in metres, or the largest error of its triangles (Holst, Schumann (2007), eq. 8
-and 16). Seen as epsilon pixels, that is z_min: a client that goes on to the children from there on
+Source: OGC 22-025r4, 3D Tiles 1.1. A tile's geometric error is the largest of its billboards, which
+is d sqrt(theta (2 - theta)) metres, and of its triangles (Holst, Schumann (2007), eq. 8 and 16). It
+is seen as epsilon pixels at z_min: a client that goes on to the children where it is more than that
 draws billboards where they are valid.
 
 Billboards are drawn from one side. Where something is seen from behind there is a second quad, with
 the picture of that side, or the front's where that serves both: one that is mirrored, normals and
 all (baking/sides.py), which a material drawn from both sides would not do. So all are one primitive
 with one material.
+
+Pictures are a few texels large, with gaps between them. Clients are told not to average them (no
+mips): they would be mixed with the gaps, and what is small would be gone before its tile is. Alpha
+is such that of each picture as much passes the test as is covered (baking/coverage.py).
 """
 
 from __future__ import annotations
@@ -20,6 +24,7 @@ from functools import cached_property
 import numpy as np
 
 from vegtool.arrays import FloatArray
+from vegtool.baking.coverage import coverage_kept
 from vegtool.formats import png
 from vegtool.formats.gltf_tile import SheetFiles, part_glb
 from vegtool.formats.ramp import RAMP
@@ -28,22 +33,24 @@ from vegtool.formats.tileset import TileEntry, tileset_files
 from vegtool.lod import Level, Triangles, billboard_quads
 from vegtool.plant import Plant
 from vegtool.progress import Progress, silent
-from vegtool.surfels.bake import billboards_of
+from vegtool.surfels.bake import GUTTER, billboards_of
 from vegtool.surfels.model import SurfelModel
-from vegtool.surfels.tiling import SurfelTile, tiles_of
+from vegtool.surfels.tiling import SurfelTile
 
 FAR = 16.0
 """Plant radii from zero: vertices of a plant that is farther away are relative to its middle."""
 
 
 def surfel_tileset(
-    model: SurfelModel, name: str, progress: Progress = silent
+    model: SurfelModel, root: SurfelTile, name: str, progress: Progress = silent
 ) -> Iterator[tuple[str, bytes]]:
     """The files of a model, by their names, in one folder: pictures, tiles NAME_0.glb, NAME_1.glb,
-    ..., and tileset.json. The same model, the same bytes."""
+    ..., and tileset.json. The same model, the same bytes.
+
+    root: of its tiles (tiling.py).
+    """
     writer = _Writer(model, plain_name(name))
     yield from writer.pictures.items()
-    root = tiles_of(model)
     tiles = list(root.all())
     entries: dict[int, TileEntry] = {}
     for number in range(len(tiles) - 1, -1, -1):  # children before their parents
@@ -80,7 +87,7 @@ class _Writer:
     @cached_property
     def quads(self) -> Triangles:
         """Of b billboards 2 b quads, with four vertices each: all fronts, then all backs."""
-        billboards, atlas = billboards_of(self.model.hierarchy), self.model.textures.atlas
+        billboards, atlas = billboards_of(self.model.hierarchy.boxes), self.model.textures.atlas
         moved = replace(billboards, center=billboards.center - self.origin)
         level = Level("billboards", billboards=moved, atlas=atlas, double_sided=False)
         return billboard_quads(level)
@@ -89,9 +96,8 @@ class _Writer:
     def sheet(self) -> SheetFiles:
         """The pictures of all billboards."""
         bumped = self.model.textures.atlas.normal is not None
-        return SheetFiles(
-            f"{self.stem}_color.png", f"{self.stem}_normal.png" if bumped else None, False
-        )
+        color, normal = f"{self.stem}_color.png", f"{self.stem}_normal.png"
+        return SheetFiles(color, normal if bumped else None, double_sided=False, averaged=False)
 
     @cached_property
     def _of_plant(self) -> dict[str, tuple[int, bytes]]:
@@ -110,7 +116,10 @@ class _Writer:
         """All, by the names of their files."""
         atlas, files = self.model.textures.atlas, {}
         if len(self.model.hierarchy):
-            files[str(self.sheet.color)] = png.encode(atlas.color)
+            rects = np.unique(np.concatenate([atlas.front, atlas.back]), axis=0)
+            color = atlas.color.copy()
+            color[..., 3] = coverage_kept(atlas.color[..., 3], rects, GUTTER)
+            files[str(self.sheet.color)] = png.encode(color)
             if atlas.normal is not None:
                 files[str(self.sheet.normal)] = png.encode(atlas.normal)
         return files | {file: data for file, (_, data) in self._of_plant.items()}

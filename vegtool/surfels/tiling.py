@@ -67,7 +67,8 @@ def tiles_of(model: SurfelModel, most: int = MOST) -> SurfelTile:
     roots = np.flatnonzero(one.father < 0).astype(np.int32)
     alone = np.flatnonzero(one.above < 0).astype(np.int32)
     tiling = _Tiling(model, most)
-    return tiling.tile(tiling.shown(roots, alone, np.inf))
+    coarsest = float(model.triangles.error[:-1].max())
+    return tiling.tile(tiling.shown(roots, alone, coarsest))
 
 
 @dataclass(frozen=True, eq=False)

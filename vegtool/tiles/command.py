@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from vegtool.tiles.jobs import Failed, Inputs, World
     from vegtool.tiles.run import Each
 
+SURFELS = ".surfels"
+"""Of a file of surfel billboards, as surfels/store.py writes it."""
 Bar = Callable[[str], AbstractContextManager[Progress]]
 """What shows progress, under a title, as long as it is open."""
 
@@ -35,14 +37,21 @@ class Result:
 
 
 def run_tiles(
-    scene: Path, library: Path, out: Path, options: TileOptions, run: RunOptions, bar: Bar,
+    scene: Path, library: Path | None, out: Path, options: TileOptions, run: RunOptions, bar: Bar,
     say: Callable[[str], None],
 ) -> Result:  # fmt: skip
-    """Make the tiles of a scene or an inventory, or, in a dry run, say what they would be.
+    """Make the tiles of a scene or an inventory, or of one plant's surfel billboards; or, in a dry
+    run, say what they would be.
 
     Raises UsageError and InputError for what is missing or broken, OutputError where nothing can be
     written, CapabilityError where nothing can draw.
     """
+    if scene.suffix.lower() == SURFELS:
+        from vegtool.tiles.surfel_tiles import run_surfel_tiles
+
+        return run_surfel_tiles(scene, library, out, options, run, bar)
+    if library is None:
+        raise UsageError(f"{scene}: expected --species, the folder of its plants; got none")
     from vegtool.tiles.jobs import Inputs, world_of
 
     started = perf_counter()
