@@ -59,7 +59,7 @@ def soup(count: int = 60) -> Plant:
 def test_small_cases(plant: Plant, tmp_path: Path) -> None:
     model = surfel_model(plant, display=COARSE)
     root = written(model, tmp_path / "all")
-    assert root["geometricError"] in (0, model.hierarchy.error.max()), "or it is all in the root"
+    assert root["geometricError"] <= model.hierarchy.error.max()
     assert root["refine"] == "REPLACE" and root["extras"]["seen_px"] == 1.0
     few = np.arange(len(model.hierarchy)) == len(model.hierarchy) - 1
     written(with_some(model, few), tmp_path / "one")

@@ -33,7 +33,8 @@ from vegtool.formats.tileset import TileEntry, tileset_files
 from vegtool.lod import Level, Triangles, billboard_quads
 from vegtool.plant import Plant
 from vegtool.progress import Progress, silent
-from vegtool.surfels.bake import GUTTER, billboards_of
+from vegtool.surfels.bake import GUTTER
+from vegtool.surfels.margin import billboards_of
 from vegtool.surfels.model import SurfelModel
 from vegtool.surfels.tiling import SurfelTile
 
@@ -87,7 +88,7 @@ class _Writer:
     @cached_property
     def quads(self) -> Triangles:
         """Of b billboards 2 b quads, with four vertices each: all fronts, then all backs."""
-        billboards, atlas = billboards_of(self.model.hierarchy.boxes), self.model.textures.atlas
+        billboards, atlas = billboards_of(self.model.hierarchy), self.model.textures.atlas
         moved = replace(billboards, center=billboards.center - self.origin)
         level = Level("billboards", billboards=moved, atlas=atlas, double_sided=False)
         return billboard_quads(level)
