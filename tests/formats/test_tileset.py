@@ -50,6 +50,16 @@ def test_tiles_are_z_up_relative_to_their_parents(tmp_path: Path) -> None:
     assert root["refine"] == "REPLACE" and "refine" not in b
 
 
+def test_what_errors_mean_is_told_where_it_is_not_what_clients_think(tmp_path: Path) -> None:
+    """As one pixel; and that of showing nothing, where that is not about twice the root's."""
+    values = json.loads(tileset(tmp_path).read_bytes())
+    assert "seen_px" not in values["root"]["extras"]
+    root = entry("root", 0.0, 0.0, 64.0, 1.5)
+    values = json.loads(tileset_files(root, None, 1.0, 64.0)["tileset.json"])
+    assert values["root"]["extras"]["seen_px"] == 1.0
+    assert [values["root"]["geometricError"], values["geometricError"]] == [1.5, 64.0]
+
+
 def drop(values: dict[str, Any], *keys: str) -> None:
     for key in keys:
         del values[key]

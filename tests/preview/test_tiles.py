@@ -502,6 +502,20 @@ def test_species_have_colours_and_merged_tiles_are_white(made: Path) -> None:
     assert leaf.kinds and 0 not in leaf.kinds and root.kinds == (0,)
 
 
+def test_a_tileset_says_as_what_its_errors_are_to_be_seen(here: Path) -> None:
+    """As one pixel in place of 16, they are 16 times as important."""
+    file = here / "tiles" / "tileset.json"
+    before = read_tile_world(file)
+    assert before.tileset.seen_px == CLIENT_PX
+    edit(file, lambda v: v["root"]["extras"].update(seen_px=1.0))
+    after = read_tile_world(file)
+    for away in (30.0, 300.0):
+        eye = replace(before.start, position=before.start.position + np.array([0.0, 0.0, away]))
+        drawn = TileForest(after.tileset).choose(eye, SIZE, Look())
+        expected = TileForest(before.tileset).choose(eye, SIZE, Look(detail=CLIENT_PX))
+        assert drawn == expected
+
+
 # ------------------------------------------------------------------------- what may be wrong
 
 
@@ -527,6 +541,7 @@ BROKEN: dict[str, Callable[[dict[str, Any]], Any]] = {
     "a NUL in a name": lambda v: v["root"]["content"].update(uri="a\0b"),
     "no extras": lambda v: v["root"].pop("extras"),
     "plants beyond count": lambda v: v["root"]["extras"].update(plants=10**30),
+    "errors to be seen as nothing": lambda v: v["root"]["extras"].update(seen_px=0.0),
     "an error in words": lambda v: v["root"].update(geometricError="much"),
     "a child without a place": lambda v: v["root"]["children"][0].pop("transform"),
     "a child that is turned": lambda v: v["root"]["children"][0]["transform"].__setitem__(0, -1.0),
