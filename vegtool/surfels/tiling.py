@@ -3,9 +3,9 @@
 After Holst, Schumann: Surfel-based billboard hierarchies for fast rendering of 3D-objects (2007),
 whose cuts (section 4.5) choose single billboards; a client of 3D Tiles chooses whole files, each
 drawn by one call or two. So a tile is a cut of a part of the hierarchy at one error: billboards of
-no greater one, and triangles where there are none. Its children are cuts of the same part at half
-of that error or less, divided by where things lie where they are many: together they show what the
-tile does, once. Errors fall strictly on the way down, to that of the original, which is none.
+no greater one, and triangles where there are none. Its children are cuts of the same part at a
+smaller error, divided by where things lie where they are many: together they show what the tile
+does, once. Errors fall on the way down, to that of the original, which is none.
 """
 
 from __future__ import annotations
@@ -23,8 +23,9 @@ from vegtool.surfels.patches import gathered
 from vegtool.surfels.regions import beneath
 from vegtool.surfels.sheets import Labels
 
-FINER = 0.5
-"""Of a tile's error: that of its children, at most."""
+FINER = 0.7
+"""Of a tile's error: that of its children, at most. At 0.5 files of a rabbit and a tree were a
+quarter smaller, and two to three times as many triangles drawn."""
 MOST = 4096
 """Triangles of a tile, about; two or four to a billboard."""
 WORTH = 1.5
