@@ -62,7 +62,8 @@ def surfel_tileset(
         entries[id(tile)] = writer.entry(file, bounds, tile, children)
         yield file, data
     gone_m = max(2 * model.plant.radius, 2 * root.error)
-    files = tileset_files(entries[id(root)], None, model.options.epsilon, gone_m)
+    whole = replace(entries[id(root)], plants=1)  # of which all others are parts
+    files = tileset_files(whole, None, model.options.epsilon, gone_m)
     yield from files.items()
 
 
@@ -142,10 +143,10 @@ class _Writer:
         """A tile as it is listed. bounds: (2, 3) metres, of what it draws itself."""
         low, high = zip(bounds, *(child.bounds for child in children), strict=True)
         foot_m = float(self.model.plant.bounds[0, 1])
+        held = np.stack([np.min(low, axis=0), np.max(high, axis=0)])
         return TileEntry(
-            file, self.origin, np.stack([np.min(low, axis=0), np.max(high, axis=0)]), tile.error, 1,
-            (foot_m, foot_m), children,
-        )  # fmt: skip
+            file, self.origin, held, tile.error, feet_m=(foot_m, foot_m), children=children
+        )
 
     def _quads(self, tile: SurfelTile) -> Triangles | None:
         """Fronts, and such backs as show something."""
