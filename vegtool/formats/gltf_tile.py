@@ -19,7 +19,7 @@ import numpy.typing as npt
 from vegtool.arrays import ByteArray, FloatArray
 from vegtool.formats import png
 from vegtool.formats.glb import ELEMENT_ARRAY_BUFFER, Document
-from vegtool.formats.gltf import plant_document
+from vegtool.formats.gltf import ALPHA_CUTOFF, plant_document
 from vegtool.formats.gltf_material import UNLIT
 from vegtool.formats.plant_table import (
     PlantTable,
@@ -46,21 +46,21 @@ SHORT_INDICES = 65535
 LINEAR, LINEAR_MIPMAP_LINEAR, CLAMP_TO_EDGE = 9729, 9987, 33071
 DULL = {"metallicFactor": 0.0, "roughnessFactor": 0.9}
 """Foliage seen from afar has no highlight of its own."""
-MASKED = {"alphaMode": "MASK", "alphaCutoff": 0.5}
 
 
 @dataclass(frozen=True)
 class SheetFiles:
     """Where a group's textures are, relative to the tile: color, and normal or None; None for both
     where all is opaque in the colours of its vertices. And of its material whether it is drawn from
-    both sides, whether light is in its colours, and whether clients are to average textures where
-    these are seen smaller than they are."""
+    both sides, whether light is in its colours, whether clients are to average textures where these
+    are seen smaller than they are, and the least alpha that is drawn."""
 
     color: str | None
     normal: str | None
     double_sided: bool
     unlit: bool = False
     averaged: bool = True
+    cutoff: float = ALPHA_CUTOFF
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +156,7 @@ def part_glb(
         images = [None if uri is None else {"uri": uri} for uri in (sheet.color, sheet.normal)]
         attributes = _plain(document, quads, sheet.color is not None, sheet.normal is not None)
         material = _material(
-            document, name, images, sheet.double_sided, sheet.unlit, sheet.averaged
+            document, name, images, sheet.double_sided, sheet.unlit, sheet.averaged, sheet.cutoff
         )
         indices = _indices(document, quads)
         primitives.append({"attributes": attributes, **indices, "material": material})
@@ -307,6 +307,7 @@ def _material(
     double_sided: bool,
     unlit: bool,
     averaged: bool = True,
+    cutoff: float = ALPHA_CUTOFF,
 ) -> int:
     """images: of colours and of normals, or None; without any, what is drawn is opaque. Pictures
     have neighbours, or edges."""
@@ -325,7 +326,7 @@ def _material(
         )  # fmt: skip
         if color is not None:
             surface["baseColorTexture"] = color
-            more |= MASKED
+            more |= {"alphaMode": "MASK", "alphaCutoff": cutoff}
         if normal is not None:
             more["normalTexture"] = normal
     return document.add(

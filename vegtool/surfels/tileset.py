@@ -11,8 +11,7 @@ all (baking/sides.py), which a material drawn from both sides would not do. So a
 with one material.
 
 Pictures are a few texels large, with gaps between them. Clients are told not to average them (no
-mips): they would be mixed with the gaps, and what is small would be gone before its tile is. Alpha
-is such that of each picture as much passes the test as is covered (baking/coverage.py).
+mips): they would be mixed with the gaps, and what is small would be gone before its tile is.
 """
 
 from __future__ import annotations
@@ -24,7 +23,6 @@ from functools import cached_property
 import numpy as np
 
 from vegtool.arrays import FloatArray
-from vegtool.baking.coverage import coverage_kept
 from vegtool.formats import png
 from vegtool.formats.gltf_tile import SheetFiles, part_glb
 from vegtool.formats.ramp import RAMP
@@ -33,11 +31,13 @@ from vegtool.formats.tileset import TileEntry, tileset_files
 from vegtool.lod import Level, Triangles, billboard_quads
 from vegtool.plant import Plant
 from vegtool.progress import Progress, silent
-from vegtool.surfels.bake import GUTTER
 from vegtool.surfels.margin import billboards_of
 from vegtool.surfels.model import SurfelModel
 from vegtool.surfels.tiling import SurfelTile
 
+CUTOFF = 0.25
+"""Of alpha, which is the coverage of texels. At one half, contours shrink what is smaller than a
+texel."""
 FAR = 16.0
 """Plant radii from zero: vertices of a plant that is farther away are relative to its middle."""
 
@@ -99,7 +99,9 @@ class _Writer:
         """The pictures of all billboards."""
         bumped = self.model.textures.atlas.normal is not None
         color, normal = f"{self.stem}_color.png", f"{self.stem}_normal.png"
-        return SheetFiles(color, normal if bumped else None, double_sided=False, averaged=False)
+        return SheetFiles(
+            color, normal if bumped else None, double_sided=False, averaged=False, cutoff=CUTOFF
+        )
 
     @cached_property
     def _of_plant(self) -> dict[str, tuple[int, bytes]]:
@@ -118,10 +120,7 @@ class _Writer:
         """All, by the names of their files."""
         atlas, files = self.model.textures.atlas, {}
         if len(self.model.hierarchy):
-            rects = np.unique(np.concatenate([atlas.front, atlas.back]), axis=0)
-            color = atlas.color.copy()
-            color[..., 3] = coverage_kept(atlas.color[..., 3], rects, GUTTER)
-            files[str(self.sheet.color)] = png.encode(color)
+            files[str(self.sheet.color)] = png.encode(atlas.color)
             if atlas.normal is not None:
                 files[str(self.sheet.normal)] = png.encode(atlas.normal)
         return files | {file: data for file, (_, data) in self._of_plant.items()}
