@@ -25,7 +25,7 @@ from vegtool.surfels.sheets import Labels
 
 FINER = 0.7
 """Of a tile's error: that of its children, at most. At 0.5 files of a rabbit and a tree were a
-quarter smaller, and two to three times as many triangles drawn."""
+quarter smaller, and up to three times as many triangles were drawn."""
 MOST = 4096
 """Triangles of a tile, about; two or four to a billboard."""
 WORTH = 1.5
