@@ -52,15 +52,14 @@ DULL = {"metallicFactor": 0.0, "roughnessFactor": 0.9}
 class SheetFiles:
     """Where a group's textures are, relative to the tile: color, and normal or None; None for both
     where all is opaque in the colours of its vertices. And of its material whether it is drawn from
-    both sides, whether light is in its colours, whether clients are to average textures where these
-    are seen smaller than they are, and the least alpha that is drawn."""
+    both sides, whether light is in its colours, and whether clients are to average textures where
+    these are seen smaller than they are."""
 
     color: str | None
     normal: str | None
     double_sided: bool
     unlit: bool = False
     averaged: bool = True
-    cutoff: float = ALPHA_CUTOFF
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +155,7 @@ def part_glb(
         images = [None if uri is None else {"uri": uri} for uri in (sheet.color, sheet.normal)]
         attributes = _plain(document, quads, sheet.color is not None, sheet.normal is not None)
         material = _material(
-            document, name, images, sheet.double_sided, sheet.unlit, sheet.averaged, sheet.cutoff
+            document, name, images, sheet.double_sided, sheet.unlit, sheet.averaged
         )
         indices = _indices(document, quads)
         primitives.append({"attributes": attributes, **indices, "material": material})
@@ -307,7 +306,6 @@ def _material(
     double_sided: bool,
     unlit: bool,
     averaged: bool = True,
-    cutoff: float = ALPHA_CUTOFF,
 ) -> int:
     """images: of colours and of normals, or None; without any, what is drawn is opaque. Pictures
     have neighbours, or edges."""
@@ -326,7 +324,7 @@ def _material(
         )  # fmt: skip
         if color is not None:
             surface["baseColorTexture"] = color
-            more |= {"alphaMode": "MASK", "alphaCutoff": cutoff}
+            more |= {"alphaMode": "MASK", "alphaCutoff": ALPHA_CUTOFF}
         if normal is not None:
             more["normalTexture"] = normal
     return document.add(

@@ -35,9 +35,6 @@ from vegtool.surfels.margin import billboards_of
 from vegtool.surfels.model import SurfelModel
 from vegtool.surfels.tiling import SurfelTile
 
-CUTOFF = 0.25
-"""Of alpha, which is the coverage of texels. At one half, contours shrink what is smaller than a
-texel."""
 FAR = 16.0
 """Plant radii from zero: vertices of a plant that is farther away are relative to its middle."""
 
@@ -99,9 +96,7 @@ class _Writer:
         """The pictures of all billboards."""
         bumped = self.model.textures.atlas.normal is not None
         color, normal = f"{self.stem}_color.png", f"{self.stem}_normal.png"
-        return SheetFiles(
-            color, normal if bumped else None, double_sided=False, averaged=False, cutoff=CUTOFF
-        )
+        return SheetFiles(color, normal if bumped else None, double_sided=False, averaged=False)
 
     @cached_property
     def _of_plant(self) -> dict[str, tuple[int, bytes]]:
