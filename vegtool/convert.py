@@ -376,9 +376,12 @@ def wanted_levels(
 ) -> list[tuple[int, float]]:
     """Of each level, how many billboards it may have and from how many metres it is for; none from
     farther than pictures are made for, but with fewer billboards."""
+    from vegtool.measure.scores import LADDER
+
     counts = billboard_counts(plant, options)
     if isinstance(make, SurfelLevels) and options.pixels is None:
-        return [(count, rounded_up(make.nearest_m(count))) for count in counts]
+        nearest = distance_of(plant, options.display, LADDER[0])
+        return [(count, rounded_up(max(make.nearest_m(count), nearest))) for count in counts]
     size = options.pixels or near_pixels(counts[0])
     first = rounded_up(distance_of(plant, options.display, size))
     near_m = near_distances(counts, first, farthest_m)

@@ -20,6 +20,7 @@ from vegtool.baking.options import BakeOptions
 from vegtool.boxes import geometric_error
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Billboards, Level
+from vegtool.measure.scores import scores
 from vegtool.plant import Plant
 from vegtool.progress import Progress, silent
 from vegtool.refine.color import unbiased_color
@@ -121,11 +122,14 @@ def surfel_level(made_from: SurfelSource, wanted: Wanted, progress: Progress = s
         level, geometric = _baked(source, model, chosen, wanted, seconds, progress)
         if level.triangles <= wanted.triangles:
             break
-    # of whole surfaces, what lacks lies at the silhouette; alpha for that would open them elsewhere
-    if level.kind == "mesh" or not any(m.alpha_mode == "mask" for m in model.plant.materials):
-        level = unbiased_color(level, source.truth_at(wanted.near_m))
-    else:
+    truth = source.truth_at(wanted.near_m)
+    plain = unbiased_color(level, truth)
+    if level.kind != "mesh":
         level = as_measured(source, wanted, level, seconds, progress)
+        # of whole surfaces, alpha for what lacks at the silhouette opens them elsewhere
+        errs = [float(scores(truth, each).values["flip"].mean()) for each in (level, plain)]
+        plain = plain if errs[1] < errs[0] else level
+    level = plain
     seconds |= {key: value for key, value in level.seconds.items() if key not in seconds}
     return replace(
         level, near_distance_m=wanted.near_m, geometric_error_m=geometric, seconds=seconds

@@ -16,6 +16,7 @@ from vegtool.baking.options import BakeOptions
 from vegtool.gl.context import describe
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Display
+from vegtool.measure.views import distance_of
 from vegtool.options import check_limits
 from vegtool.plant import Plant
 from vegtool.progress import Progress, part_of, silent
@@ -50,11 +51,12 @@ def surfel_model(
 ) -> SurfelModel:
     """A plant as surfel billboards over triangles.
 
-    max_texture: texels along a side of the atlas. Raises UsageError for options out of range,
-    CapabilityError where nothing can draw.
+    max_texture: texels along a side of the atlas. Raises UsageError for options out of range and
+    for a plant without extent, CapabilityError where nothing can draw.
     """
     options, display = options or SurfelOptions(), display or Display()
     check_limits(options)
+    distance_of(plant, display, 1.0)  # refuses a plant without extent
     seconds: dict[str, float] = {}
     with timed(seconds, "triangles"):
         mt = multi_triangulation(plant, display, options.epsilon, part_of(progress, 0.0, 0.5))
@@ -111,10 +113,11 @@ def _begins_farther(
     limit: int,
 ) -> str:  # fmt: skip
     count = len(triangles(mt, by_error(mt, asked)))
-    most = min(options.max_texture_memory, BYTES_PER_TEXEL * limit**2 / MEGABYTE)
     begins, wanted = least / m_per_pixel, asked / m_per_pixel
+    side_mb = BYTES_PER_TEXEL * limit**2 / MEGABYTE
+    by_side = side_mb < options.max_texture_memory
     return (
-        f"textures of {most:g} MB are too small: billboards begin {begins:.3g} m away in place of "
-        f"{wanted:.3g}; nearer, up to {count:,} triangles are drawn. Allow more with "
-        "--max-texture-memory"
+        f"textures of {min(side_mb, options.max_texture_memory):.3g} MB are too small: billboards "
+        f"begin {begins:.3g} m away in place of {wanted:.3g}; nearer, triangles are drawn, up to "
+        f"{count:,}. Allow more with {'--max-texture' if by_side else '--max-texture-memory'}"
     )

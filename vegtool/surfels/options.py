@@ -37,7 +37,7 @@ class SurfelOptions:
         most=100.0,
     )
     max_texture_memory: float = option(
-        64.0,
+        32.0,
         "Megabytes that the textures of all billboards may take on the GPU, 8 bytes a texel. Where "
         "that is too little, triangles are drawn farther away.",
         least=0.001,
