@@ -369,6 +369,7 @@ def figures(found: dict[str, list[dict[str, Any]]], folder: Path) -> None:
                 axes.plot(sides, [row[key] for row in rows], color=color, label=key)
             axes.set(title=name, xscale="log", yscale="symlog", xlabel="distance, mean sides")
             axes.set_ylabel("drawn")
+            axes.set_ylim(0)
             axes.legend(frameon=False)
             axes.spines[["top", "right"]].set_visible(False)
         whole_figure.savefig(folder / "surfel_counts.png", dpi=110)
