@@ -16,14 +16,14 @@ import numpy.typing as npt
 from vegtool.arrays import FloatArray, IntArray
 from vegtool.surfels.blue.compiled import compiled
 
-LEAF = 32
+LEAF = 64
 """Points of a leaf."""
-FAN = 8
+FAN = 32
 """Children of a node."""
 DIGIT = 11
 """Bits of a key sorted by at a time."""
-KEY = 5 * DIGIT
-"""Bits of a key."""
+DIGITS = 5
+"""Of a key, at most: 55 bits."""
 TAKEN = -1.0
 """Squared distance of what is taken already, or is no point."""
 
@@ -38,7 +38,7 @@ def traverse(points: FloatArray, first: int, count: int) -> IntArray:
     levels = [-(-len(points) // LEAF)]
     while levels[-1] > 1:
         levels.append(-(-levels[-1] // FAN))
-    starts = np.cumsum([0] + [-(-size // FAN) * FAN for size in levels])
+    starts = np.cumsum([0] + [-(-size // FAN) for size in levels])
     return np.asarray(_traverse(points, order, np.array(levels), starts, first, count))
 
 
@@ -46,45 +46,39 @@ def _curve(points: FloatArray) -> IntArray:
     """(n,) int32 points along a Morton curve; of the same cell, by number."""
     low = points.min(axis=0)
     extent = float((points.max(axis=0) - low).max())
-    bits = KEY // points.shape[1]
+    dimensions = points.shape[1]
+    bits = min(DIGIT, DIGITS * DIGIT // dimensions)
     scale = (2**bits - 1) / extent if extent > 0 else 0.0
-    return np.asarray(_sorted(_keys(points, low, scale, bits)))
+    keys = _keys(points, low, scale, bits)
+    return np.asarray(_sorted(keys, -(-bits * dimensions // DIGIT)))
 
 
 @compiled
 def _keys(points: Any, low: Any, scale: float, bits: int) -> Any:
     """(n,) the bits of all coordinates in turn, those of highest weight first."""
     size, dimensions = points.shape
-    keys = np.zeros(size, np.uint64)
-    spread = np.zeros(256, np.uint64)
-    for value in range(256):
-        for bit in range(8):
-            spread[value] |= np.uint64(((value >> bit) & 1)) << np.uint64(bit * dimensions)
-    step = np.uint64(8 * dimensions)
+    keys = np.empty(size, np.uint64)
+    spread = np.zeros(1 << bits, np.uint64)
+    for value in range(1 << bits):
+        for bit in range(bits):
+            spread[value] |= np.uint64((value >> bit) & 1) << np.uint64(bit * dimensions)
     for i in range(size):
         key = np.uint64(0)
         for k in range(dimensions):
-            cell = np.uint64((points[i, k] - low[k]) * scale)
-            part = np.uint64(0)
-            shift = np.uint64(k)
-            for _ in range(0, bits, 8):
-                part |= spread[cell & np.uint64(255)] << shift
-                cell >>= np.uint64(8)
-                shift += step
-            key |= part
+            key |= spread[np.int64((points[i, k] - low[k]) * scale)] << np.uint64(k)
         keys[i] = key
     return keys
 
 
 @compiled
-def _sorted(keys: Any) -> Any:
+def _sorted(keys: Any, many: int) -> Any:
     """(n,) int32 the order of keys, equal ones by number: digits from the lowest on."""
     size, digits = len(keys), 1 << DIGIT
     order, other = np.arange(size).astype(np.int32), np.empty(size, np.int32)
     spare = np.empty(size, np.uint64)
     mask = np.uint64(digits - 1)
-    for shift in range(0, KEY, DIGIT):
-        down = np.uint64(shift)
+    for turn in range(many):
+        down = np.uint64(turn * DIGIT)
         place = np.zeros(digits + 1, np.int64)
         for i in range(size):
             place[np.int64((keys[i] >> down) & mask) + 1] += 1
@@ -101,103 +95,130 @@ def _sorted(keys: Any) -> Any:
 
 
 @compiled
+def _outside(low: Any, high: Any, point: Any, squared: Any) -> None:
+    """Squared distances (FAN,) of a point (d,) from boxes (d, FAN)."""
+    for i in range(FAN):
+        squared[i] = 0.0
+    for k in range(len(point)):
+        place = point[k]
+        for i in range(FAN):
+            under, over = low[k, i] - place, place - high[k, i]
+            out = under if under > over else over
+            out = out if out > 0.0 else 0.0
+            squared[i] += out * out
+
+
+@compiled
+def _nearer(points: Any, point: Any, near: Any, squared: Any, lanes: Any) -> float:
+    """Lowers squared distances (LEAF,) of points (d, LEAF) to those from a point (d,); the largest."""
+    for i in range(LEAF):
+        squared[i] = 0.0
+    for k in range(len(point)):
+        place = point[k]
+        for i in range(LEAF):
+            out = points[k, i] - place
+            squared[i] += out * out
+    for i in range(LEAF):
+        near[i] = near[i] if near[i] < squared[i] else squared[i]
+    a = b = c = d = TAKEN  # several, as each waits for the one before
+    for i in range(0, LEAF, 4):
+        a = near[i] if near[i] > a else a
+        b = near[i + 1] if near[i + 1] > b else b
+        c = near[i + 2] if near[i + 2] > c else c
+        d = near[i + 3] if near[i + 3] > d else d
+    a, c = a if a > b else b, c if c > d else d
+    return a if a > c else c
+
+
+@compiled
+def _largest(values: Any) -> int:
+    best = 0
+    for i in range(1, len(values)):
+        if values[i] > values[best]:
+            best = i
+    return best
+
+
+@compiled
 def _traverse(points: Any, order: Any, levels: Any, starts: Any, first: int, count: int) -> Any:
+    """levels: nodes of each level, leaves first. starts: the first group of FAN nodes of each."""
     size, dimensions = points.shape
     height = len(levels)
-    leaves = starts[1]
-    at = np.zeros((dimensions, leaves * LEAF))
-    near = np.full(leaves * LEAF, TAKEN)
-    low = np.full((dimensions, starts[height]), np.inf)
-    high = np.full((dimensions, starts[height]), -np.inf)
-    top = np.full(starts[height], TAKEN)
-    slot = 0
+    at = np.zeros((levels[0], dimensions, LEAF))
+    near = np.full((levels[0], LEAF), TAKEN)
+    low = np.full((starts[height], dimensions, FAN), np.inf)
+    high = np.full((starts[height], dimensions, FAN), -np.inf)
+    top = np.full((starts[height], FAN), TAKEN)
+    leaf = place = 0
     for i in range(size):
-        near[i] = np.inf
+        near[i // LEAF, i % LEAF] = np.inf
         if order[i] == first:
-            slot = i
+            leaf, place = i // LEAF, i % LEAF
         for k in range(dimensions):
-            value = points[order[i], k]
-            at[k, i] = value
-            low[k, i // LEAF] = min(low[k, i // LEAF], value)
-            high[k, i // LEAF] = max(high[k, i // LEAF], value)
-    top[: levels[0]] = np.inf
+            at[i // LEAF, k, i % LEAF] = points[order[i], k]
+    for node in range(levels[0]):
+        filled = min(size - node * LEAF, LEAF)
+        for k in range(dimensions):
+            least = most = at[node, k, 0]
+            for i in range(filled):
+                value = at[node, k, i]
+                least = value if value < least else least
+                most = value if value > most else most
+            low[node // FAN, k, node % FAN] = least
+            high[node // FAN, k, node % FAN] = most
+        top[node // FAN, node % FAN] = np.inf
     for level in range(1, height):
-        top[starts[level] : starts[level] + levels[level]] = np.inf
-        for node in range(levels[level - 1]):
-            child, parent = starts[level - 1] + node, starts[level] + node // FAN
+        for group in range(starts[level - 1], starts[level]):
+            node = group - starts[level - 1]
+            parent, child = starts[level] + node // FAN, node % FAN
+            top[parent, child] = np.inf
             for k in range(dimensions):
-                low[k, parent] = min(low[k, parent], low[k, child])
-                high[k, parent] = max(high[k, parent], high[k, child])
+                low[parent, k, child] = low[group, k].min()
+                high[parent, k, child] = high[group, k].max()
 
     taken = np.empty(count, np.int32)
     new = np.empty(dimensions)
     away = np.empty(FAN)
-    squared = np.empty(LEAF)
+    squared, lanes = np.empty(LEAF), np.empty(8)
     touched = np.zeros((height, levels[0]), np.int32)
     many = np.zeros(height, np.int64)
     for rank in range(count):
         if rank > 0:
-            node = 0
+            leaf = 0
             for level in range(height - 2, -1, -1):
-                begin = starts[level] + node * FAN
-                best = 0
-                for child in range(1, FAN):
-                    if top[begin + child] > top[begin + best]:
-                        best = child
-                node = node * FAN + best
-            slot = node * LEAF
-            for i in range(node * LEAF + 1, (node + 1) * LEAF):
-                if near[i] > near[slot]:
-                    slot = i
-            if near[slot] <= 0:  # only copies of what is taken are left
-                rest = np.sort(order[np.flatnonzero(near[:size] == 0)])
-                taken[rank:] = rest[: count - rank]
+                leaf = leaf * FAN + _largest(top[starts[level] + leaf])
+            place = _largest(near[leaf])
+            if near[leaf, place] <= 0:  # only copies of what is taken are left
+                copies = np.sort(order[np.flatnonzero(near.ravel()[:size] == 0)])
+                taken[rank:] = copies[: count - rank]
                 break
-        taken[rank] = order[slot]
-        near[slot] = TAKEN
+        taken[rank] = order[leaf * LEAF + place]
+        near[leaf, place] = TAKEN
         for k in range(dimensions):
-            new[k] = at[k, slot]
+            new[k] = at[leaf, k, place]
         touched[height - 1, 0], many[height - 1] = 0, 1
         for level in range(height - 2, -1, -1):
             found = 0
             for i in range(many[level + 1]):
                 node = touched[level + 1, i]
-                begin = starts[level] + node * FAN
+                group = starts[level] + node
+                tops = top[group]
+                _outside(low[group], high[group], new, away)
                 for child in range(FAN):
-                    away[child] = 0.0
-                for k in range(dimensions):
-                    place = new[k]
-                    for child in range(FAN):
-                        out = max(
-                            max(low[k, begin + child] - place, place - high[k, begin + child]), 0.0
-                        )
-                        away[child] += out * out
-                for child in range(FAN):
-                    if away[child] < top[begin + child]:
+                    if away[child] < tops[child]:
                         touched[level, found] = node * FAN + child
                         found += 1
             many[level] = found
         for i in range(many[0]):
-            begin = touched[0, i] * LEAF
-            for j in range(LEAF):
-                squared[j] = 0.0
-            for k in range(dimensions):
-                place = new[k]
-                for j in range(LEAF):
-                    out = at[k, begin + j] - place
-                    squared[j] += out * out
-            largest = TAKEN
-            for j in range(LEAF):
-                value = min(near[begin + j], squared[j])
-                near[begin + j] = value
-                largest = max(largest, value)
-            top[touched[0, i]] = largest
-        for level in range(1, height):
+            node = touched[0, i]
+            largest = _nearer(at[node], new, near[node], squared, lanes)
+            top[node // FAN, node % FAN] = largest
+        for level in range(1, height - 1):
             for i in range(many[level]):
                 node = touched[level, i]
-                begin = starts[level - 1] + node * FAN
+                tops = top[starts[level - 1] + node]
                 largest = TAKEN
                 for child in range(FAN):
-                    largest = max(largest, top[begin + child])
-                top[starts[level] + node] = largest
+                    largest = tops[child] if tops[child] > largest else largest
+                top[starts[level] + node // FAN, node % FAN] = largest
     return taken

@@ -17,10 +17,9 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 def compiled(function: Function) -> Function:
     """The function, compiled when it is first called, and kept on disk where that can be written.
 
-    Numbers are never reordered, so that every machine finds the same. NaN is not provided for.
+    Arithmetic is IEEE's in the order that is written, so that every machine finds the same.
     """
-    exact = {"nnan", "nsz"}  # without these no loop for a largest value is done by vectors
     try:
-        return cast(Function, njit(cache=True, fastmath=exact)(function))
+        return cast(Function, njit(cache=True)(function))
     except RuntimeError:  # numba found no folder to keep it in
-        return cast(Function, njit(fastmath=exact)(function))
+        return cast(Function, njit(function))

@@ -1,4 +1,4 @@
-"""Rounds of the randomised greedy order, compiled.
+"""Rounds of the randomised greedy order (randomised.py), compiled.
 
 Points taken stand in a grid of hashed cells, which is made anew with smaller ones whenever there are
 twice as many. A candidate is let go as soon as it is known to be no farther than those that are
@@ -14,117 +14,114 @@ import numpy as np
 from vegtool.surfels.blue.compiled import compiled
 
 CELL = 1.0
-"""Side of a cell, in distances of what is accepted when the grid is made."""
-MOST = 1 << 20
+"""Side of a cell, in distances accepted when the grid is made."""
+RINGS = 8
+"""Of cells that are looked at before all points are."""
+FINEST = float(1 << 20)
 """Cells along an axis, at most."""
 
 
 @compiled
-def _slot(x: int, y: int, z: int, mask: int) -> int:
-    return ((x * 73856093) ^ (y * 19349663) ^ (z * 83492791)) & mask
-
-
-@compiled
-def rounds(
-    points: Any, count: int, random: Any, sample: int, more_every: int, near: float
-) -> Any:
-    """(count,) int32 of points (n, 3) with coordinates from 0 to 1; 1 <= count <= n."""
-    size = len(points)
-    pool = np.arange(size).astype(np.int32)
-    left = size
-    taken = np.empty(count, np.int32)
-    x, y, z = np.empty(count), np.empty(count), np.empty(count)
+def rounds(points: Any, count: int, random: Any, sample: int, more_every: int, near: float) -> Any:
+    """(k,) int32 of points (n, 3) with coordinates from 0 to 1; 1 <= count <= n, k <= count."""
+    left = len(points)
+    pool = np.arange(left).astype(np.int32)
+    taken, at, done = np.empty(count, np.int32), np.empty((count, 3)), 0
     slots = 1
     while slots < 2 * count:
         slots *= 2
-    mask = slots - 1
-    head = np.full(slots, -1, np.int32)
-    after = np.empty(count, np.int32)
-    done, gridded, cells = 0, 0, 1.0
-
-    drawn = np.empty((3, sample))
-    best = np.empty(sample)
-    row = np.empty(sample, np.int64)
+    head, after = np.full(slots, -1, np.int32), np.empty(count, np.int32)
+    cells, gridded = 1.0, 0
+    drawn = np.empty((sample, 3))
+    best, row = np.empty(sample), np.empty(sample, np.int64)
     gone = np.zeros(sample, np.bool_)
     number = 0
     while done < count and left > 0:
+        many = min(sample, left) if done > 0 else 1
         most = min(1 + number // more_every, count - done)
-        many = min(sample, left)
-        if done == 0:
-            many = most = 1
         number += 1
         for i in range(many):  # without replacement: those drawn move to the front
             j = i + int(random.random() * (left - i))
             pool[i], pool[j] = pool[j], pool[i]
         for i in range(many):
             for k in range(3):
-                drawn[k, i] = points[pool[i], k]
-            gone[i] = False
+                drawn[i, k] = points[pool[i], k]
 
-        accepted, least = 0, -1.0  # best[:accepted] fall; least is what a candidate has to exceed
+        accepted, least = 0, 0.0  # best, the squared distances of those accepted, falls
         for i in range(many):
-            px, py, pz = drawn[0, i], drawn[1, i], drawn[2, i]
-            nearest = np.inf
-            cx, cy, cz = int(px * cells), int(py * cells), int(pz * cells)
-            ring = 0
-            while done > 0:
-                for ix in range(max(cx - ring, 0), min(cx + ring, int(cells)) + 1):
-                    for iy in range(max(cy - ring, 0), min(cy + ring, int(cells)) + 1):
-                        shell = abs(ix - cx) == ring or abs(iy - cy) == ring
-                        step = 1 if shell or ring == 0 else 2 * ring
-                        for iz in range(cz - ring, cz + ring + 1, step):
-                            j = head[_slot(ix, iy, iz, mask)]
-                            while j >= 0:
-                                dx, dy, dz = x[j] - px, y[j] - py, z[j] - pz
-                                nearest = min(nearest, dx * dx + dy * dy + dz * dz)
-                                j = after[j]
-                        if nearest <= least:
-                            break
-                    if nearest <= least:
-                        break
-                if nearest <= least or nearest <= (ring / cells) ** 2 or ring > cells:
-                    break
-                ring += 1
-            if nearest <= least:
-                gone[i] = nearest < near * near * least
+            squared = _squared_distance(drawn[i], at, done, cells, head, after, least)
+            gone[i] = squared <= near * near * least
+            if squared <= least:
                 continue
-            place = accepted if accepted < most else most - 1
-            while place > 0 and best[place - 1] < nearest:
+            place = min(accepted, most - 1)
+            while place > 0 and best[place - 1] < squared:
                 best[place], row[place] = best[place - 1], row[place - 1]
                 place -= 1
-            best[place], row[place] = nearest, i
+            best[place], row[place] = squared, i
             accepted = min(accepted + 1, most)
             if accepted == most:
                 least = best[most - 1]
 
-        limit = best[accepted - 1]
         before = done
         for i in range(accepted):
-            px, py, pz = drawn[0, row[i]], drawn[1, row[i]], drawn[2, row[i]]
-            apart = np.inf
+            one, apart = drawn[row[i]], np.inf
             for j in range(before, done):
-                dx, dy, dz = x[j] - px, y[j] - py, z[j] - pz
-                apart = min(apart, dx * dx + dy * dy + dz * dz)
-            if apart >= limit:
-                x[done], y[done], z[done] = px, py, pz
+                apart = min(apart, _squared(one, at[j]))
+            least = best[accepted - 1]
+            if apart >= least:
+                at[done] = one
                 taken[done] = pool[row[i]]
                 done += 1
-                gone[row[i]] = True
-            else:
-                gone[row[i]] = apart < near * near * limit
+            gone[row[i]] = apart >= least or apart <= near * near * least
         for i in range(many - 1, -1, -1):
             if gone[i]:
                 left -= 1
                 pool[i] = pool[left]
 
-        if done >= 2 * gridded:
-            cells = max(1.0, min(np.floor(1 / (CELL * np.sqrt(limit))), float(MOST))) if limit > 0 else float(MOST)
-            if before == 0:
-                cells = 1.0
+        if done >= 2 * gridded and before > 0 and done > before:
+            cells = max(1.0, min(np.floor(1 / (CELL * np.sqrt(least))), FINEST))
             head[:] = -1
             gridded, before = done, 0
         for j in range(before, done):
-            slot = _slot(int(x[j] * cells), int(y[j] * cells), int(z[j] * cells), mask)
+            slot = _slot(int(at[j, 0] * cells), int(at[j, 1] * cells), int(at[j, 2] * cells), slots)
             after[j] = head[slot]
             head[slot] = j
     return taken[:done]
+
+
+@compiled
+def _squared(one: Any, other: Any) -> float:
+    x, y, z = one[0] - other[0], one[1] - other[1], one[2] - other[2]
+    return x * x + y * y + z * z
+
+
+@compiled
+def _slot(x: int, y: int, z: int, slots: int) -> int:
+    """Of a hash table: Teschner et al., Optimized spatial hashing (2003)."""
+    return ((x * 73856093) ^ (y * 19349663) ^ (z * 83492791)) & (slots - 1)
+
+
+@compiled
+def _squared_distance(
+    one: Any, at: Any, done: int, cells: float, head: Any, after: Any, least: float
+) -> float:
+    """To the nearest of those taken; anything that is no more than `least`, if that is no more."""
+    nearest = np.inf
+    x, y, z = int(one[0] * cells), int(one[1] * cells), int(one[2] * cells)
+    end = int(cells)
+    for ring in range(min(RINGS, end) + 1):
+        for i in range(max(x - ring, 0), min(x + ring, end) + 1):
+            for j in range(max(y - ring, 0), min(y + ring, end) + 1):
+                inner = ring > 0 and abs(i - x) < ring and abs(j - y) < ring
+                for k in range(z - ring, z + ring + 1, 2 * ring if inner else 1):
+                    point = head[_slot(i, j, k, len(head))]
+                    while point >= 0:
+                        nearest = min(nearest, _squared(one, at[point]))
+                        point = after[point]
+                if nearest <= least:
+                    return nearest
+        if nearest <= (ring / cells) ** 2:
+            return nearest
+    for point in range(done):
+        nearest = min(nearest, _squared(one, at[point]))
+    return nearest

@@ -1,0 +1,61 @@
+"""How evenly the points of a prefix are spread, and how long a prefix is for discs of a radius.
+
+Brandt, Jähn, Fischer, Meyer auf der Heide: Rendering of complex heterogenous scenes using
+progressive blue surfels (2019), section 4.1 and figure 3. That does not say what distances are
+relative to; here it is the largest that as many points in a plane can have from one another, on a
+hexagonal grid (Lagae, Dutré: A comparison of methods for generating Poisson disk distributions,
+2008).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil
+
+import numpy as np
+
+from vegtool.arrays import FloatArray, checked
+
+PREFIX = 1000
+"""Points of the prefix that is measured, p_m."""
+
+
+@dataclass(frozen=True)
+class Spacing:
+    """What prefix lengths follow from. length: points of the prefix measured, p_m, copies not
+    counted. radius_m: median of the distances from each to the nearest other, r_m; zero where there
+    is no other. total: points of the whole order."""
+
+    length: int
+    radius_m: float
+    total: int
+
+    def prefix(self, radius_m: float) -> int:
+        """p(r): points of the shortest prefix that discs of a radius, metres, cover a surface with;
+        from 1, or 0 where there are none, to all."""
+        if self.radius_m >= radius_m * (self.total / max(self.length, 1)) ** 0.5:
+            return self.total  # of radius 0 too, which nothing is divided by
+        return min(max(ceil(self.length * (self.radius_m / radius_m) ** 2), 1), self.total)
+
+
+def spacing(positions: FloatArray) -> Spacing:
+    """Measures points (n, 3) in progressive order, metres."""
+    positions = checked("positions", positions, (None, 3), np.float64)
+    places = np.unique(positions[:PREFIX], axis=0)
+    radius = float(np.median(nearest(places))) if len(places) > 1 else 0.0
+    return Spacing(len(places), radius, len(positions))
+
+
+def nearest(positions: FloatArray) -> FloatArray:
+    """(n,) metres from each point (n, 3) to the nearest other one; infinite for one alone."""
+    from scipy.spatial import cKDTree
+
+    if len(positions) < 2:
+        return np.full(len(positions), np.inf)
+    return np.asarray(cKDTree(positions).query(positions, 2)[0][:, 1])
+
+
+def relative(positions: FloatArray, area: float) -> FloatArray:
+    """(n,) distance from each point (n, 3) to the nearest other, of the largest that n points on a
+    plane of an area, m2, can all have. Below 1 on average, about 0.5 at random."""
+    return nearest(positions) / (2 * area / (3**0.5 * max(len(positions), 1))) ** 0.5
