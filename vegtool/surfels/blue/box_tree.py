@@ -44,19 +44,22 @@ def traverse(points: FloatArray, first: int, count: int) -> IntArray:
 
 def _curve(points: FloatArray) -> IntArray:
     """(n,) int32 points along a Morton curve; of the same cell, by number."""
-    low = points.min(axis=0)
-    extent = float((points.max(axis=0) - low).max())
     dimensions = points.shape[1]
     bits = min(DIGIT, DIGITS * DIGIT // dimensions)
-    scale = (2**bits - 1) / extent if extent > 0 else 0.0
-    keys = _keys(points, low, scale, bits)
-    return np.asarray(_sorted(keys, -(-bits * dimensions // DIGIT)))
+    return np.asarray(_sorted(_keys(points, bits), -(-bits * dimensions // DIGIT)))
 
 
 @compiled
-def _keys(points: Any, low: Any, scale: float, bits: int) -> Any:
+def _keys(points: Any, bits: int) -> Any:
     """(n,) the bits of all coordinates in turn, those of highest weight first."""
     size, dimensions = points.shape
+    low, high = points[0].copy(), points[0].copy()
+    for i in range(size):
+        for k in range(dimensions):
+            low[k] = points[i, k] if points[i, k] < low[k] else low[k]
+            high[k] = points[i, k] if points[i, k] > high[k] else high[k]
+    extent = (high - low).max()
+    scale = ((1 << bits) - 1) / extent if extent > 0 else 0.0
     keys = np.empty(size, np.uint64)
     spread = np.zeros(1 << bits, np.uint64)
     for value in range(1 << bits):

@@ -16,7 +16,7 @@ from vegtool.errors import UsageError
 def places(
     positions: FloatArray, normals: FloatArray | None = None, normal_weight: float = 0.0
 ) -> FloatArray:
-    """(n, 3) positions from 0 to 1 along the longest side of their bounds; (n, 6) with normals.
+    """(n, 3) positions, or (n, 6) with normals, metres.
 
     positions: (n, 3) metres. normals: (n, 3) unit. normal_weight: metres, what a unit of difference
     of normals counts as: two sides are 2 normal_weight apart. Raises ValueError where arrays are no
@@ -27,15 +27,10 @@ def places(
         raise UsageError(f"normal weight: expected metres, zero or more; got {normal_weight}")
     if normal_weight > 0 and normals is None:
         raise UsageError(f"normal weight: expected normals to weigh by {normal_weight} m; got none")
-    if len(positions) == 0:
-        return np.zeros((0, 3))
-    low, high = positions.min(axis=0), positions.max(axis=0)
-    extent = max(float((high / 2 - low / 2).max()) * 2, normal_weight) or 1.0
-    at = (positions - low) / extent
     if normals is None or normal_weight == 0:
-        return np.asarray(at)
+        return positions
     normals = checked("normals", normals, (len(positions), 3), np.float64)
-    return np.hstack([at, normals * (normal_weight / extent)])
+    return np.hstack([positions, normals * normal_weight])
 
 
 def asked(count: int, there: int) -> int:

@@ -17,13 +17,11 @@ CELL = 1.0
 """Side of a cell, in distances accepted when the grid is made."""
 RINGS = 8
 """Of cells that are looked at before all points are."""
-FINEST = float(1 << 20)
-"""Cells along an axis, at most."""
 
 
 @compiled
 def rounds(points: Any, count: int, random: Any, sample: int, more_every: int, near: float) -> Any:
-    """(k,) int32 of points (n, 3) with coordinates from 0 to 1; 1 <= count <= n, k <= count."""
+    """(k,) int32 of points (n, 3); 1 <= count <= n, k <= count."""
     left = len(points)
     pool = np.arange(left).astype(np.int32)
     taken, at, done = np.empty(count, np.int32), np.empty((count, 3)), 0
@@ -31,7 +29,7 @@ def rounds(points: Any, count: int, random: Any, sample: int, more_every: int, n
     while slots < 2 * count:
         slots *= 2
     head, after = np.full(slots, -1, np.int32), np.empty(count, np.int32)
-    cells, gridded = 1.0, 0
+    cells, gridded = 0.0, 0  # cells to a metre
     drawn = np.empty((sample, 3))
     best, row = np.empty(sample), np.empty(sample, np.int64)
     gone = np.zeros(sample, np.bool_)
@@ -49,7 +47,9 @@ def rounds(points: Any, count: int, random: Any, sample: int, more_every: int, n
 
         accepted, least = 0, 0.0  # best, the squared distances of those accepted, falls
         for i in range(many):
-            squared = _squared_distance(drawn[i], at, done, cells, head, after, least)
+            squared = _squared_distance(
+                drawn[i, 0], drawn[i, 1], drawn[i, 2], at, done, cells, head, after, least
+            )
             gone[i] = squared <= near * near * least
             if squared <= least:
                 continue
@@ -66,7 +66,7 @@ def rounds(points: Any, count: int, random: Any, sample: int, more_every: int, n
         for i in range(accepted):
             one, apart = drawn[row[i]], np.inf
             for j in range(before, done):
-                apart = min(apart, _squared(one, at[j]))
+                apart = min(apart, _squared(one[0], one[1], one[2], at, j))
             least = best[accepted - 1]
             if apart >= least:
                 at[done] = one
@@ -79,19 +79,24 @@ def rounds(points: Any, count: int, random: Any, sample: int, more_every: int, n
                 pool[i] = pool[left]
 
         if done >= 2 * gridded and before > 0 and done > before:
-            cells = max(1.0, min(np.floor(1 / (CELL * np.sqrt(least))), FINEST))
+            cells = 1 / (CELL * np.sqrt(least))
             head[:] = -1
             gridded, before = done, 0
         for j in range(before, done):
-            slot = _slot(int(at[j, 0] * cells), int(at[j, 1] * cells), int(at[j, 2] * cells), slots)
+            slot = _slot(
+                int(np.floor(at[j, 0] * cells)),
+                int(np.floor(at[j, 1] * cells)),
+                int(np.floor(at[j, 2] * cells)),
+                slots,
+            )
             after[j] = head[slot]
             head[slot] = j
     return taken[:done]
 
 
 @compiled
-def _squared(one: Any, other: Any) -> float:
-    x, y, z = one[0] - other[0], one[1] - other[1], one[2] - other[2]
+def _squared(x: float, y: float, z: float, at: Any, point: int) -> float:
+    x, y, z = x - at[point, 0], y - at[point, 1], z - at[point, 2]
     return x * x + y * y + z * z
 
 
@@ -103,25 +108,26 @@ def _slot(x: int, y: int, z: int, slots: int) -> int:
 
 @compiled
 def _squared_distance(
-    one: Any, at: Any, done: int, cells: float, head: Any, after: Any, least: float
+    x: float, y: float, z: float, at: Any, done: int, cells: float, head: Any, after: Any, least: float
 ) -> float:
     """To the nearest of those taken; anything that is no more than `least`, if that is no more."""
     nearest = np.inf
-    x, y, z = int(one[0] * cells), int(one[1] * cells), int(one[2] * cells)
-    end = int(cells)
-    for ring in range(min(RINGS, end) + 1):
-        for i in range(max(x - ring, 0), min(x + ring, end) + 1):
-            for j in range(max(y - ring, 0), min(y + ring, end) + 1):
-                inner = ring > 0 and abs(i - x) < ring and abs(j - y) < ring
-                for k in range(z - ring, z + ring + 1, 2 * ring if inner else 1):
+    u, v, w = int(np.floor(x * cells)), int(np.floor(y * cells)), int(np.floor(z * cells))
+    for ring in range(RINGS if cells > 0 else 0):
+        for i in range(u - ring, u + ring + 1):
+            for j in range(v - ring, v + ring + 1):
+                inner = ring > 0 and abs(i - u) < ring and abs(j - v) < ring
+                for k in range(w - ring, w + ring + 1, 2 * ring if inner else 1):
                     point = head[_slot(i, j, k, len(head))]
                     while point >= 0:
-                        nearest = min(nearest, _squared(one, at[point]))
+                        squared = _squared(x, y, z, at, point)
+                        nearest = squared if squared < nearest else nearest
                         point = after[point]
-                if nearest <= least:
-                    return nearest
+                    if nearest <= least:
+                        return nearest
         if nearest <= (ring / cells) ** 2:
             return nearest
     for point in range(done):
-        nearest = min(nearest, _squared(one, at[point]))
+        squared = _squared(x, y, z, at, point)
+        nearest = squared if squared < nearest else nearest
     return nearest
