@@ -39,7 +39,13 @@ def traverse(points: FloatArray, first: int, count: int) -> IntArray:
     while levels[-1] > 1:
         levels.append(-(-levels[-1] // FAN))
     starts = np.cumsum([0] + [-(-size // FAN) for size in levels])
-    return np.asarray(_traverse(points, order, np.array(levels), starts, first, count))
+    taken = _traverse(points, order, np.array(levels), starts, first, count)
+    if len(taken) == count:
+        return np.asarray(taken)
+    copies = np.ones(len(points), bool)
+    copies[taken] = False
+    left = np.flatnonzero(copies)[: count - len(taken)]
+    return np.concatenate([taken, left.astype(np.int32)])
 
 
 def _curve(points: FloatArray) -> IntArray:
@@ -53,12 +59,13 @@ def _curve(points: FloatArray) -> IntArray:
 def _keys(points: Any, bits: int) -> Any:
     """(n,) the bits of all coordinates in turn, those of highest weight first."""
     size, dimensions = points.shape
-    low, high = points[0].copy(), points[0].copy()
-    for i in range(size):
-        for k in range(dimensions):
-            low[k] = points[i, k] if points[i, k] < low[k] else low[k]
-            high[k] = points[i, k] if points[i, k] > high[k] else high[k]
-    extent = (high - low).max()
+    low, extent = np.empty(dimensions), 0.0
+    for k in range(dimensions):
+        least = most = points[0, k]
+        for i in range(size):
+            least = points[i, k] if points[i, k] < least else least
+            most = points[i, k] if points[i, k] > most else most
+        low[k], extent = least, max(extent, most - least)
     scale = ((1 << bits) - 1) / extent if extent > 0 else 0.0
     keys = np.empty(size, np.uint64)
     spread = np.zeros(1 << bits, np.uint64)
@@ -77,7 +84,9 @@ def _keys(points: Any, bits: int) -> Any:
 def _sorted(keys: Any, many: int) -> Any:
     """(n,) int32 the order of keys, equal ones by number: digits from the lowest on."""
     size, digits = len(keys), 1 << DIGIT
-    order, other = np.arange(size).astype(np.int32), np.empty(size, np.int32)
+    order, other = np.empty(size, np.int32), np.empty(size, np.int32)
+    for i in range(size):
+        order[i] = i
     spare = np.empty(size, np.uint64)
     mask = np.uint64(digits - 1)
     for turn in range(many):
@@ -112,7 +121,7 @@ def _outside(low: Any, high: Any, point: Any, squared: Any) -> None:
 
 
 @compiled
-def _nearer(points: Any, point: Any, near: Any, squared: Any, lanes: Any) -> float:
+def _nearer(points: Any, point: Any, near: Any, squared: Any) -> float:
     """Lowers squared distances (LEAF,) of points (d, LEAF) to those from a point (d,); the largest."""
     for i in range(LEAF):
         squared[i] = 0.0
@@ -144,7 +153,8 @@ def _largest(values: Any) -> int:
 
 @compiled
 def _traverse(points: Any, order: Any, levels: Any, starts: Any, first: int, count: int) -> Any:
-    """levels: nodes of each level, leaves first. starts: the first group of FAN nodes of each."""
+    """(k,) int32 points, k < count where only copies of them are left. levels: nodes of each level,
+    leaves first. starts: the first group of FAN nodes of each."""
     size, dimensions = points.shape
     height = len(levels)
     at = np.zeros((levels[0], dimensions, LEAF))
@@ -176,13 +186,14 @@ def _traverse(points: Any, order: Any, levels: Any, starts: Any, first: int, cou
             parent, child = starts[level] + node // FAN, node % FAN
             top[parent, child] = np.inf
             for k in range(dimensions):
-                low[parent, k, child] = low[group, k].min()
-                high[parent, k, child] = high[group, k].max()
+                for i in range(FAN):
+                    low[parent, k, child] = min(low[parent, k, child], low[group, k, i])
+                    high[parent, k, child] = max(high[parent, k, child], high[group, k, i])
 
     taken = np.empty(count, np.int32)
     new = np.empty(dimensions)
     away = np.empty(FAN)
-    squared, lanes = np.empty(LEAF), np.empty(8)
+    squared = np.empty(LEAF)
     touched = np.zeros((height, levels[0]), np.int32)
     many = np.zeros(height, np.int64)
     for rank in range(count):
@@ -191,10 +202,8 @@ def _traverse(points: Any, order: Any, levels: Any, starts: Any, first: int, cou
             for level in range(height - 2, -1, -1):
                 leaf = leaf * FAN + _largest(top[starts[level] + leaf])
             place = _largest(near[leaf])
-            if near[leaf, place] <= 0:  # only copies of what is taken are left
-                copies = np.sort(order[np.flatnonzero(near.ravel()[:size] == 0)])
-                taken[rank:] = copies[: count - rank]
-                break
+            if near[leaf, place] <= 0:
+                return taken[:rank]
         taken[rank] = order[leaf * LEAF + place]
         near[leaf, place] = TAKEN
         for k in range(dimensions):
@@ -214,7 +223,7 @@ def _traverse(points: Any, order: Any, levels: Any, starts: Any, first: int, cou
             many[level] = found
         for i in range(many[0]):
             node = touched[0, i]
-            largest = _nearer(at[node], new, near[node], squared, lanes)
+            largest = _nearer(at[node], new, near[node], squared)
             top[node // FAN, node % FAN] = largest
         for level in range(1, height - 1):
             for i in range(many[level]):

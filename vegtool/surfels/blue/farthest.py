@@ -10,9 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from vegtool.arrays import FloatArray, IntArray
-from vegtool.seeding import generator
 from vegtool.surfels.blue.exact import exact_order
-from vegtool.surfels.blue.places import asked
+from vegtool.surfels.blue.places import asked, drawn
 
 CANDIDATES = 10
 """For each point asked. With fewer the last points are unevenly spaced; more take longer."""
@@ -34,7 +33,7 @@ def farthest_order(
     arrays of another shape.
     """
     there = len(positions)
-    some = _drawn(there, min(CANDIDATES * asked(count, there), there), seed)
+    some = drawn(there, min(CANDIDATES * asked(count, there), there), seed)
     chosen = exact_order(
         positions[some],
         count,
@@ -43,11 +42,3 @@ def farthest_order(
         normal_weight=normal_weight,
     )
     return some[chosen]
-
-
-def _drawn(there: int, many: int, seed: int) -> IntArray:
-    """(many,) int32 rising: one at random of each of as many runs of candidates. Neighbours in a
-    picture are neighbours on the surface, so that this is more even than random, and faster read."""
-    starts = np.arange(many + 1) * there // max(many, 1)
-    random = generator(seed, "blue candidates").random(many)
-    return np.asarray(starts[:-1] + (random * np.diff(starts)).astype(np.int64), np.int32)

@@ -1,16 +1,16 @@
-"""Points among which distances are measured: positions, and normals as far as a weight says.
+"""Points among which distances are measured, and some of them.
 
-The normal as further coordinates is as in Eppstein, Har-Peled, Sidiropoulos: Approximate greedy
-clustering and distance selection for graph metrics (2015) any metric is; Brandt et al., section 6,
-leave it open.
+Brandt et al. measure distances of positions, so that what is thin gets points of one side only where
+the other has some. With the normal as three further coordinates both sides are surfaces of their own.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from vegtool.arrays import FloatArray, checked
+from vegtool.arrays import FloatArray, IntArray, checked
 from vegtool.errors import UsageError
+from vegtool.seeding import generator
 
 
 def places(
@@ -23,14 +23,15 @@ def places(
     such, and UsageError where the weight is negative or has no normals to weigh.
     """
     positions = checked("positions", positions, (None, 3), np.float64)
-    if not (normal_weight >= 0 and np.isfinite(normal_weight)):
+    if not 0 <= normal_weight < np.inf:
         raise UsageError(f"normal weight: expected metres, zero or more; got {normal_weight}")
     if normal_weight > 0 and normals is None:
         raise UsageError(f"normal weight: expected normals to weigh by {normal_weight} m; got none")
     if normals is None or normal_weight == 0:
         return positions
     normals = checked("normals", normals, (len(positions), 3), np.float64)
-    return np.hstack([positions, normals * normal_weight])
+    joined = np.hstack([positions, normals * normal_weight])
+    return checked("places", joined, (None, 6), np.float64)
 
 
 def asked(count: int, there: int) -> int:
@@ -38,3 +39,14 @@ def asked(count: int, there: int) -> int:
     if count < 0:
         raise UsageError(f"points: expected zero or more; got {count:,}")
     return min(count, there)
+
+
+def drawn(there: int, many: int, seed: int) -> IntArray:
+    """(many,) int32 rising, many <= there: one at random of each of as many runs of candidates.
+
+    Neighbours in a picture are neighbours on the surface, so that this is more even than any at
+    random, and faster read.
+    """
+    starts = np.arange(many + 1) * there // max(many, 1)
+    random = generator(seed, "blue candidates").random(many)
+    return np.asarray(starts[:-1] + (random * np.diff(starts)).astype(np.int64), np.int32)

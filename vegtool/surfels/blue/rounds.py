@@ -20,10 +20,12 @@ RINGS = 8
 
 
 @compiled
-def rounds(points: Any, count: int, random: Any, sample: int, more_every: int, near: float) -> Any:
-    """(k,) int32 of points (n, 3); 1 <= count <= n, k <= count."""
+def rounds(points: Any, count: int, random: Any, sample: int, more_every: int) -> Any:
+    """(k,) int32 of points (n, 3), k < count where only copies of them are left. 1 <= count <= n."""
     left = len(points)
-    pool = np.arange(left).astype(np.int32)
+    pool = np.empty(left, np.int32)
+    for i in range(left):
+        pool[i] = i
     taken, at, done = np.empty(count, np.int32), np.empty((count, 3)), 0
     slots = 1
     while slots < 2 * count:
@@ -50,7 +52,7 @@ def rounds(points: Any, count: int, random: Any, sample: int, more_every: int, n
             squared = _squared_distance(
                 drawn[i, 0], drawn[i, 1], drawn[i, 2], at, done, cells, head, after, least
             )
-            gone[i] = squared <= near * near * least
+            gone[i] = squared <= 0
             if squared <= least:
                 continue
             place = min(accepted, most - 1)
@@ -72,7 +74,7 @@ def rounds(points: Any, count: int, random: Any, sample: int, more_every: int, n
                 at[done] = one
                 taken[done] = pool[row[i]]
                 done += 1
-            gone[row[i]] = apart >= least or apart <= near * near * least
+            gone[row[i]] = apart >= least or apart <= 0
         for i in range(many - 1, -1, -1):
             if gone[i]:
                 left -= 1
@@ -108,7 +110,15 @@ def _slot(x: int, y: int, z: int, slots: int) -> int:
 
 @compiled
 def _squared_distance(
-    x: float, y: float, z: float, at: Any, done: int, cells: float, head: Any, after: Any, least: float
+    x: float,
+    y: float,
+    z: float,
+    at: Any,
+    done: int,
+    cells: float,
+    head: Any,
+    after: Any,
+    least: float,
 ) -> float:
     """To the nearest of those taken; anything that is no more than `least`, if that is no more."""
     nearest = np.inf
