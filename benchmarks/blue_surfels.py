@@ -7,9 +7,11 @@ After Brandt, Jähn, Fischer and Meyer auf der Heide, "Rendering of complex hete
 progressive blue surfels" (2019), table 2 and figure 3, on a model made by script (solids/).
 
 orders: 1.75 million candidates, as eight orthographic views show them; the paper's randomised
-order, ours and the exact one, for 10,000, 50,000 and 100,000 points: processor and wall time, in one
-thread, compiled before; and the distance from each point of a prefix to the nearest other, of the
-largest possible: least and median.
+order, ours and the exact one, for 10,000, 50,000 and 100,000 points: processor and wall time, in
+one thread, compiled before; and the distance from each point of a prefix to the nearest other, of
+the largest possible: least and median.
+
+plate: two sides a hair apart, ours with normals and without: the largest hole on a side, and time.
 
 What is missed of what is asked is told at the end, and the exit status is then 1.
 """
@@ -24,6 +26,7 @@ from pathlib import Path
 from time import perf_counter, process_time
 
 import numpy as np
+from scipy.spatial import cKDTree
 from solids.rabbit import rabbit
 
 from vegtool.arrays import FloatArray, IntArray, unit
@@ -37,7 +40,7 @@ from vegtool.surfels.blue.exact import exact_order
 from vegtool.surfels.blue.farthest import farthest_order
 from vegtool.surfels.blue.randomised import randomised_order
 
-PARTS = ("orders",)
+PARTS = ("orders", "plate")
 CANDIDATES = 1_750_000
 PIXELS = 1024
 SIZES = {10_000: 105.0, 50_000: 311.0, 100_000: 592.0}
@@ -49,6 +52,9 @@ ASKED = {10_000: (0.7, 1.1, 1.0), 50_000: (0.7, 1.1, 1.0), 100_000: (1.1, 1.0, 1
 PREFIXES = (100, 300, 1_000, 3_000, 10_000, 30_000, 50_000, 100_000)
 VIOLINS = (1_000, 5_000, 10_000)
 """Prefixes of figure 3."""
+HAIR_M = 1e-4
+WEIGHTS_M = (0.0, 0.005, 0.02, 0.1)
+"""Of normals, on a plate."""
 METHODS: dict[str, Callable[..., IntArray]] = {
     "randomised": randomised_order,
     "ours": farthest_order,
@@ -105,7 +111,9 @@ def orders(repeat: int, violins: Path | None) -> list[str]:
                 found = [nearest(points[order[:prefix]]) for prefix in prefixes]
                 scale = [(2 * area / (3**0.5 * prefix)) ** 0.5 for prefix in prefixes]
                 spread[name].append(
-                    np.array([(d.min() / s, np.median(d) / s) for d, s in zip(found, scale)])
+                    np.array(
+                        [(d.min() / s, np.median(d) / s) for d, s in zip(found, scale, strict=True)]
+                    )
                 )
                 if seed == 0 and size == max(SIZES):
                     shown[name] = order
@@ -125,7 +133,7 @@ def orders(repeat: int, violins: Path | None) -> list[str]:
             least = ASKED[size][1 + i]
             missed += [
                 f"{size:,}: {what} distance at {prefix:,} is {v:.3f} times, not {least}"
-                for prefix, v in zip(prefixes, ratio)
+                for prefix, v in zip(prefixes, ratio, strict=True)
                 if v < least
             ]
         part = times["ours"][0] / times["randomised"][0]
@@ -138,6 +146,28 @@ def orders(repeat: int, violins: Path | None) -> list[str]:
         random = np.random.default_rng(0).permutation(len(points))
         draw_violins(violins, points, {"random": random, **shown}, area)
     return missed
+
+
+def plate(repeat: int) -> None:
+    """Prints holes, with normals and without."""
+    rng = np.random.default_rng(0)
+    side = np.where(np.arange(CANDIDATES) < CANDIDATES // 2, 1.0, -1.0)
+    points = np.column_stack([rng.random((CANDIDATES, 2)), HAIR_M / 2 * side])
+    normals = np.outer(side, [0.0, 0.0, 1.0])
+    print(f"a plate of one metre, its sides {HAIR_M} m apart: largest hole of a side")
+    for size, weight in product(SIZES, WEIGHTS_M):
+        spent, holes = [], []
+        for seed in range(repeat):
+            start = process_time()
+            order = farthest_order(points, size, seed=seed, normals=normals, normal_weight=weight)
+            spent.append(process_time() - start)
+            for way in (-1, 1):
+                chosen = points[order][side[order] == way]
+                holes.append(cKDTree(chosen).query(points[side == way][::10])[0].max())
+        print(
+            f"  {size:7,} points, weight {weight:5} m: {np.median(spent) * 1e3:6.0f} ms processor,"
+            f" {np.median(holes):.5f} m"
+        )
 
 
 def draw_violins(path: Path, points: FloatArray, order: dict[str, IntArray], area: float) -> None:
@@ -165,6 +195,8 @@ def main() -> int:
     missed = []
     if "orders" in options.parts.split(","):
         missed += orders(options.repeat, options.violins)
+    if "plate" in options.parts.split(","):
+        plate(options.repeat)
     print("\n".join(missed) if missed else "nothing is missed")
     return int(bool(missed))
 

@@ -38,8 +38,8 @@ def averaged(
     result = values[order]
     from scipy.spatial import cKDTree
 
-    length = min(LONGEST, 1 << max(len(order) - 1, 0).bit_length())
-    while length > 0:  # the longest first: earlier points are in all of them, and the last counts
+    length = min(LONGEST, 1 << (len(order) - 1).bit_length()) if len(order) else 0
+    while length > 0:  # the longest first: early points are in all, and the shortest is to count
         prefix = order[:length]
         some = drawn(len(at), min(MEANT * length, len(at)), length)
         of = cKDTree(at[prefix]).query(at[some])[1]

@@ -94,8 +94,8 @@ def _sorted(keys: Any, many: int) -> Any:
         place = np.zeros(digits + 1, np.int64)
         for i in range(size):
             place[np.int64((keys[i] >> down) & mask) + 1] += 1
-        for digit in range(digits):
-            place[digit + 1] += place[digit]
+        for i in range(digits):
+            place[i + 1] += place[i]
         for i in range(size):
             digit = np.int64((keys[i] >> down) & mask)
             spare[place[digit]] = keys[i]
@@ -122,7 +122,8 @@ def _outside(low: Any, high: Any, point: Any, squared: Any) -> None:
 
 @compiled
 def _nearer(points: Any, point: Any, near: Any, squared: Any) -> float:
-    """Lowers squared distances (LEAF,) of points (d, LEAF) to those from a point (d,); the largest."""
+    """Lowers squared distances (LEAF,) of points (d, LEAF) to those from a point
+    (d,), where these are less; the largest."""
     for i in range(LEAF):
         squared[i] = 0.0
     for k in range(len(point)):

@@ -58,4 +58,5 @@ def nearest(positions: FloatArray) -> FloatArray:
 def relative(positions: FloatArray, area: float) -> FloatArray:
     """(n,) distance from each point (n, 3) to the nearest other, of the largest that n points on a
     plane of an area, m2, can all have. Below 1 on average, about 0.5 at random."""
-    return nearest(positions) / (2 * area / (3**0.5 * max(len(positions), 1))) ** 0.5
+    largest = (2 * area / (3**0.5 * max(len(positions), 1))) ** 0.5
+    return np.asarray(nearest(positions) / largest)

@@ -1,13 +1,10 @@
 """The progressive order that we make: the exact greedy permutation of some of the candidates.
 
-Brandt et al., section 3.2, take the best of some 200 random candidates again and again. Here as many
-candidates as the whole order looks at are drawn once, and ordered exactly: no draw is wasted on
-places that are covered already, which they mostly are towards the end.
+Brandt et al., section 3.2, take the best of some 200 random candidates again and again, most of
+which are near to what is taken. Here a few for each point are drawn once, and ordered exactly.
 """
 
 from __future__ import annotations
-
-import numpy as np
 
 from vegtool.arrays import FloatArray, IntArray
 from vegtool.surfels.blue.exact import exact_order

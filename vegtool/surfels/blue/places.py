@@ -1,7 +1,8 @@
 """Points among which distances are measured, and some of them.
 
-Brandt et al. measure distances of positions, so that what is thin gets points of one side only where
-the other has some. With the normal as three further coordinates both sides are surfaces of their own.
+Brandt et al. measure distances of positions, so that on what is thin the points of one side keep
+those of the other away. With the normal as three further coordinates both are surfaces of their
+own.
 """
 
 from __future__ import annotations

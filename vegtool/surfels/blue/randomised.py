@@ -1,10 +1,10 @@
 """The randomised greedy order of the paper, which ours is compared with.
 
 Brandt, Jähn, Fischer, Meyer auf der Heide: Rendering of complex heterogenous scenes using
-progressive blue surfels (2019), section 3.2. Those accepted in a round are compared with one another
-too: who is nearer to one of them than the least distance accepted waits for another round. That near
-samples are dropped for good, which the paper leaves open, has no effect that could be measured but
-for orders of most of the candidates, which end early: only copies are dropped.
+progressive blue surfels (2019), section 3.2. Those accepted in a round are compared with one
+another too: one that is nearer to another than the least distance accepted goes back. The paper
+lets samples near to what is taken be dropped for good. Here only copies are: more makes distances
+no better by any measurable amount, and ends orders of most of the candidates early.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Rounds of the randomised greedy order (randomised.py), compiled.
 
-Points taken stand in a grid of hashed cells, which is made anew with smaller ones whenever there are
-twice as many. A candidate is let go as soon as it is known to be no farther than those that are
+Points taken stand in a grid of hashed cells, which is made anew with smaller ones whenever there
+are twice as many. A candidate is let go as soon as it is known to be no farther than those that are
 accepted anyway.
 """
 
@@ -21,7 +21,7 @@ RINGS = 8
 
 @compiled
 def rounds(points: Any, count: int, random: Any, sample: int, more_every: int) -> Any:
-    """(k,) int32 of points (n, 3), k < count where only copies of them are left. 1 <= count <= n."""
+    """(k,) int32 of points (n, 3), k < count where only copies are left. 1 <= count <= n."""
     left = len(points)
     pool = np.empty(left, np.int32)
     for i in range(left):
