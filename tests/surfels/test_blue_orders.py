@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -146,6 +147,23 @@ def test_an_outlier_far_away_comes_second() -> None:
     points = np.vstack([sphere(2000), [[1e8, 0, 0]]])
     assert 2000 in exact_order(points, 10)[:2]
     assert len(randomised_order(points, 500)) == 500
+
+
+@pytest.mark.parametrize("scale", [1e-320, 1e-300, 1e300])
+def test_sizes_whose_squares_are_no_numbers(scale: float) -> None:
+    """Nothing is said of the order, but that all come, once."""
+    points = sphere(300) * scale
+    assert sorted(exact_order(points, 300)) == list(range(300))
+    assert len(np.unique(randomised_order(points, 100))) in (1, 100)
+
+
+def test_what_cannot_be_kept_is_compiled_all_the_same() -> None:
+    """Without a file there is no place beside it."""
+    from vegtool.surfels.blue.compiled import compiled
+
+    names: dict[str, Any] = {}
+    exec("def twice(x):\n    return 2 * x", names)
+    assert compiled(names["twice"])(21) == 42
 
 
 def test_both_sides_of_a_thin_plate_get_points() -> None:

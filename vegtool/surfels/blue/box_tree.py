@@ -66,7 +66,8 @@ def _keys(points: Any, bits: int) -> Any:
             least = points[i, k] if points[i, k] < least else least
             most = points[i, k] if points[i, k] > most else most
         low[k], extent = least, max(extent, most - least)
-    scale = ((1 << bits) - 1) / extent if extent > 0 else 0.0
+    last = (1 << bits) - 1
+    scale = last / extent if extent > 0 else 0.0
     keys = np.empty(size, np.uint64)
     spread = np.zeros(1 << bits, np.uint64)
     for value in range(1 << bits):
@@ -75,7 +76,9 @@ def _keys(points: Any, bits: int) -> Any:
     for i in range(size):
         key = np.uint64(0)
         for k in range(dimensions):
-            key |= spread[np.int64((points[i, k] - low[k]) * scale)] << np.uint64(k)
+            cell = (points[i, k] - low[k]) * scale
+            inside = 0 <= cell <= last  # but where numbers overflow, and any order is right
+            key |= spread[int(cell) if inside else 0] << np.uint64(k)
         keys[i] = key
     return keys
 
