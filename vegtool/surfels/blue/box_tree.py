@@ -3,7 +3,7 @@
 Gonzalez: Clustering to minimize the maximum intercluster distance (1985) has the order. Buckets of
 points that remember their largest distance, so that most are left alone, are as in Han et al.:
 QuickFPS (2023); here they are few neighbours along a Morton curve, with a tree of boxes above them,
-eight to a node, which gives both the farthest point and all whose distance a new one changes.
+which gives both the farthest point and all whose distance a new one changes.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from vegtool.arrays import FloatArray, IntArray
 from vegtool.surfels.blue.compiled import compiled
@@ -27,12 +26,9 @@ DIGITS = 5
 TAKEN = -1.0
 """Squared distance of what is taken already, or is no point."""
 
-Keys = npt.NDArray[np.uint64]
-Rows = npt.NDArray[np.int64]
-
 
 def traverse(points: FloatArray, first: int, count: int) -> IntArray:
-    """(count,) int32 of points (n, d), beginning with `first`; then always the farthest of those
+    """(count,) int32 of points (n, d), beginning with `first`; then always the farthest from all
     taken. 1 <= count <= n. Of equally far ones, any; those at no distance come last, by number."""
     order = _curve(points)
     levels = [-(-len(points) // LEAF)]
@@ -57,7 +53,7 @@ def _curve(points: FloatArray) -> IntArray:
 
 @compiled
 def _keys(points: Any, bits: int) -> Any:
-    """(n,) the bits of all coordinates in turn, those of highest weight first."""
+    """(n,) the bits of all coordinates in turn, those the highest first."""
     size, dimensions = points.shape
     low, extent = np.empty(dimensions), 0.0
     for k in range(dimensions):
