@@ -1,8 +1,8 @@
 """Points among which distances are measured, and some of them.
 
 Brandt et al. measure distances of positions, so that on what is thin the points of one side keep
-those of the other away (a limit stated in their section 6). With the normal as three further coordinates both are surfaces of their
-own.
+those of the other away, a limit that their section 6 states. With the normal as three further
+coordinates both sides are surfaces of their own.
 """
 
 from __future__ import annotations
