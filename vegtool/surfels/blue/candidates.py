@@ -146,9 +146,13 @@ def seen_from(buffers: PlantBuffers, direction: FloatArray, resolution: int) -> 
 
 def joined(some: list[Candidates]) -> Candidates:
     """All of them, in order."""
-    names = ("position", "normal", "color", "material")
-    arrays = [np.concatenate([getattr(one, name) for one in some]) for name in names]
-    return Candidates(*arrays, pixel_m=some[0].pixel_m)
+    return Candidates(
+        np.concatenate([one.position for one in some]),
+        np.concatenate([one.normal for one in some]),
+        np.concatenate([one.color for one in some]),
+        np.concatenate([one.material for one in some]),
+        some[0].pixel_m,
+    )
 
 
 class Covered:
