@@ -29,8 +29,8 @@ def drawn(
             camera.eye, np.zeros((1, 3)), np.array([turn]), np.ones(1), np.array([radius])
         )
         return pictured(
-            buffers.ctx, shot, lambda part: buffers.draw(rows, np.array([prefix]), part, Light(), footprint=4),
-            4, 0,
+            buffers.ctx, shot,
+            lambda part: buffers.draw(rows, np.array([prefix]), part, Light(), footprint=4), 4, 0,
         )  # fmt: skip
 
 

@@ -95,8 +95,8 @@ class PointsBuffers(OnGpu):
         """Draw the first `prefix` (n,) surfels at each of n places into the framebuffer in use,
         which has depth; returns how many in all.
 
-        shot: its target is the eye. footprint: samples per pixel and axis. Places whose prefixes are alike to a power of two are one call,
-        and have as many as the longest.
+        shot: its target is the eye. footprint: samples per pixel and axis. Places whose prefixes
+        are alike to a power of two are one call, and have as many as the longest.
         """
         defines = {
             "UNLIT": self.points.unlit, "PAINTED": paint is not None,
