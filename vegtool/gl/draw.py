@@ -165,17 +165,22 @@ def set_light(
     shader: moderngl.Program, buffers: PlantBuffers, light: Light, shadows: SunMaps | None = None
 ) -> None:
     """Set the uniforms of shading.glsl and shadow.glsl, as far as a program has them."""
-    direction = light.unit if shadows is None else shadows.direction
+    set_sky(shader, light, light.unit if shadows is None else shadows.direction)
+    if shadows is not None and "sun_depth" in shader:
+        shadows.use(shader, buffers)
+
+
+def set_sky(shader: moderngl.Program, light: Light, direction: FloatArray | None = None) -> None:
+    """Set the uniforms of shading.glsl, as far as a program has them. direction: (3,) unit, of the
+    sun, the light's own if None."""
     values = {
-        "sun_direction": tuple(direction),
+        "sun_direction": tuple(light.unit if direction is None else direction),
         "sun": light.sun,
         "sky": (light.sky_above, light.sky_below),
     }
     for name, value in values.items():
         if name in shader:
             shader[name] = value
-    if shadows is not None and "sun_depth" in shader:
-        shadows.use(shader, buffers)
 
 
 def placed(buffers: PlantBuffers, shot: Shot) -> tuple[float, ...]:

@@ -1,0 +1,80 @@
+"""Surfels drawn as discs: where they are, how large, from which side, and as many as are asked."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from vegtool.gl.draw import Shot
+from vegtool.gl.points import Points, PointsBuffers
+from vegtool.gl.surfel_draw import pictured
+from vegtool.lighting.light import Light
+from vegtool.lod import Display
+from vegtool.measure.views import framed
+
+pytestmark = pytest.mark.gl
+Z = np.array([0.0, 0, 1])
+
+
+def drawn(
+    points: Points, radius: float, prefix: int, direction: np.ndarray = Z, turn: float = 0.0
+) -> np.ndarray:
+    """From ten metres away, a metre is 93.5 pixels."""
+    camera = framed(np.zeros(3), 1.5, direction, 10.0, Display())
+    moved = np.eye(4)
+    moved[:3, 3] = camera.eye - camera.target
+    shot = Shot(camera.view_projection() @ moved, camera.eye, camera.width, camera.height)
+    with PointsBuffers(points) as buffers:
+        rows = buffers.instances(
+            camera.eye, np.zeros((1, 3)), np.array([turn]), np.ones(1), np.array([radius])
+        )
+        return pictured(
+            buffers.ctx, shot,
+            lambda part: buffers.draw(rows, np.array([prefix]), part, Light(), footprint=4), 4, 0,
+        )  # fmt: skip
+
+
+def of(*rows: tuple[tuple[float, float, float], tuple[float, float, float]]) -> Points:
+    position, normal = (np.array(part, dtype=float) for part in zip(*rows, strict=True))
+    return Points(position, normal, np.ones_like(position))
+
+
+ONE = of(((0, 0, 0), (0, 0, 1)), ((1, 0, 0), (0, 0, 1)))
+
+
+def test_a_disc_is_as_large_as_its_radius_says() -> None:
+    """Seen from its front, a circle; from 60 degrees, half of it; from its edge, nothing."""
+    focal = Display().pixels_per_metre(10.0)
+    for degrees, share in ((0, 1.0), (60, 0.5), (90, 0.0)):
+        turn = np.radians(degrees)
+        way = np.array([np.sin(turn), 0, np.cos(turn)])
+        area = drawn(ONE, 0.2, 1, way)[..., 3].sum()
+        assert area == pytest.approx(share * np.pi * (0.2 * focal) ** 2, rel=0.03, abs=1.0)
+
+
+def test_both_sides_are_seen_and_only_the_prefix_is_drawn() -> None:
+    front = drawn(ONE, 0.2, 1)[..., 3].sum()
+    assert drawn(ONE, 0.2, 1, -Z)[..., 3].sum() == pytest.approx(front, rel=0.02)
+    assert drawn(ONE, 0.2, 2)[..., 3].sum() == pytest.approx(2 * front, rel=0.03)
+    assert drawn(ONE, 0.2, 0)[..., 3].sum() == 0
+    assert drawn(ONE, 0.2, 99)[..., 3].sum() == pytest.approx(2 * front, rel=0.03), "all there are"
+
+
+def test_a_turn_of_the_plant_is_a_turn_of_the_eye() -> None:
+    turn = 0.7
+    way = np.array([np.sin(turn), 0, np.cos(turn)])
+    one, other = drawn(ONE, 0.2, 2, turn=turn), drawn(ONE, 0.2, 2, np.array([-way[0], 0, way[2]]))
+    assert np.abs(one[..., 3] - other[..., 3]).mean() < 2e-3
+
+
+def test_discs_cut_each_other_where_their_planes_meet() -> None:
+    """Two crossed discs: from between them, each shows the half that is nearer."""
+    crossed = Points(
+        np.array([[0, 0, 0], [0, 0, 0], [1, 1, 1e-9]], dtype=float),
+        np.array([[1, 0, 1], [-1, 0, 1], [0, 0, 1]]) / np.array([[2**0.5], [2**0.5], [1]]),
+        np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 0]]), unlit=True,
+    )  # fmt: skip
+    picture = drawn(crossed, 0.3, 2)
+    left, right = np.array_split(picture[..., :2].sum(axis=0), 2)
+    # a plane of normal (1, 0, 1) rises to the left
+    assert left[:, 0].sum() > 50 * left[:, 1].sum() and right[:, 1].sum() > 50 * right[:, 0].sum()

@@ -1,0 +1,157 @@
+"""Surfels drawn as oriented discs, a prefix of their order at each of many places.
+
+Brandt et al.: Rendering of complex heterogenous scenes using progressive blue surfels (2019),
+section 4.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+
+from vegtool.arrays import FloatArray, IntArray, checked
+from vegtool.gl.context import OnGpu, context
+from vegtool.gl.draw import Shot, set_sky
+from vegtool.gl.instances import OVERDRAW_STEP, View
+from vegtool.gl.pace import Pace
+from vegtool.gl.program import program
+from vegtool.lighting.light import Light
+
+POINT_INSTANCE = np.dtype([("place", "f4", 4), ("turn_size", "f4", 3)])
+"""place: metres from the eye to the points' center, and metres of a unit. turn_size: cosine and
+sine of the turn about y, radius of the discs in that unit."""
+PER_INSTANCE = (("in_place", "4f", 0), ("in_turn_size", "3f", 16))
+"""Attributes: name, format and offset."""
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """n surfels, of which any first part is a picture of the whole. position: (n, 3) metres.
+    normal: (n, 3) unit. color: (n, 3) linear. unlit: colours are what is seen."""
+
+    position: FloatArray
+    normal: FloatArray
+    color: FloatArray
+    unlit: bool = False
+
+    def __post_init__(self) -> None:
+        position = checked("Points.position", self.position, (None, 3), np.float64)
+        object.__setattr__(self, "position", position)
+        for name in ("normal", "color"):
+            value = checked(f"Points.{name}", getattr(self, name), position.shape, np.float64)
+            object.__setattr__(self, name, value)
+
+
+class PointsBuffers(OnGpu):
+    """Surfels on the GPU, relative to their middle in units of their radius, both as they are
+    bounded. A context manager: leaving releases."""
+
+    def __init__(self, points: Points, *, ctx: moderngl.Context | None = None) -> None:
+        self.points, self.ctx = points, ctx or context()
+        low, high = points.position.min(axis=0), points.position.max(axis=0)
+        self.center = (low + high) / 2
+        self.unit = float(np.linalg.norm(high - low) / 2) or 1.0
+        local = (points.position - self.center) / self.unit
+        rows = np.concatenate([local, points.normal, points.color], axis=1).astype(np.float32)
+        self._vertices = self.ctx.buffer(np.ascontiguousarray(rows))
+        self._rows = self.ctx.buffer(reserve=POINT_INSTANCE.itemsize, dynamic=True)
+        self._arrays: dict[moderngl.Program, moderngl.VertexArray] = {}
+        self._pace = Pace(self.ctx)
+
+    def release(self) -> None:
+        """Free everything on the GPU."""
+        for array in self._arrays.values():
+            array.release()
+        self._arrays.clear()
+        self._vertices.release()
+        self._rows.release()
+
+    def instances(
+        self, eye: FloatArray, foot: FloatArray, turn: FloatArray, scale: FloatArray,
+        radius: FloatArray,
+    ) -> np.ndarray:  # fmt: skip
+        """(n,) POINT_INSTANCE: surfels at so many places, as an eye (3,) sees them.
+
+        foot: (n, 3) metres, of their origin. turn: (n,) radians about y. scale: (n,). radius: (n,)
+        metres of the discs, before scaling.
+        """
+        cosine, sine = np.cos(turn), np.sin(turn)
+        x, y, z = self.center
+        middle = np.stack(
+            [cosine * x + sine * z, np.full(len(foot), y), cosine * z - sine * x], axis=1
+        )
+        rows = np.empty(len(foot), POINT_INSTANCE)
+        rows["place"][:, :3] = foot - eye + scale[:, None] * middle
+        rows["place"][:, 3] = scale * self.unit
+        rows["turn_size"] = np.stack([cosine, sine, radius / self.unit], axis=1)
+        return rows
+
+    def draw(
+        self, rows: np.ndarray, prefix: IntArray, shot: Shot, light: Light, view: View = "lit",
+        paint: tuple[float, float, float] | None = None, footprint: float = 1.0,
+    ) -> int:  # fmt: skip
+        """Draw the first `prefix` (n,) surfels at each of n places into the framebuffer in use,
+        which has depth; returns how many in all.
+
+        shot: its target is the eye. footprint: samples per pixel and axis. Places whose prefixes
+        are alike to a power of two are one call, and have as many as the longest.
+        """
+        defines = {
+            "UNLIT": self.points.unlit, "PAINTED": paint is not None,
+            f"OVERDRAW {OVERDRAW_STEP}": view == "overdraw",
+        }  # fmt: skip
+        told = [name for name, wanted in defines.items() if wanted]
+        shader = program(self.ctx, "point.vert", "point.frag", *told)
+        matrix = shot.view_projection
+        shader["view_projection"] = tuple(matrix.T.ravel())
+        for name, value in (
+            ("unprojection", tuple(np.linalg.inv(matrix).T.ravel())),
+            ("size", (footprint * shot.width, footprint * shot.height)),
+            ("focal", footprint * float(np.linalg.norm(matrix[0, :3])) * shot.width / 2),
+            ("paint", paint),
+        ):
+            if name in shader:
+                shader[name] = value
+        set_sky(shader, light)
+        order = np.argsort(-prefix, kind="stable")
+        order = order[prefix[order] > 0]
+        count = np.minimum(prefix[order], len(self.points.position))
+        self._write(rows[order])
+        self.ctx.enable(moderngl.PROGRAM_POINT_SIZE)
+        starts = np.flatnonzero(np.diff(np.ceil(np.log2(count)), prepend=np.inf))
+        sent = 0
+        for first, end in zip(starts, np.append(starts[1:], len(count)), strict=False):
+            most = int(count[first])
+            array = self._array(shader, int(first))
+            array.render(moderngl.POINTS, vertices=most, instances=int(end - first))
+            self._pace.sent(most * int(end - first))
+            sent += most * int(end - first)
+        self.ctx.disable(moderngl.PROGRAM_POINT_SIZE)
+        return sent
+
+    def _write(self, rows: np.ndarray) -> None:
+        if self._rows.size < rows.nbytes:
+            self._rows.release()
+            self._rows = self.ctx.buffer(reserve=rows.nbytes * 3 // 2, dynamic=True)
+        self._rows.orphan(self._rows.size)
+        self._rows.write(np.ascontiguousarray(rows))
+
+    def _array(self, shader: moderngl.Program, first: int) -> moderngl.VertexArray:
+        if shader not in self._arrays:
+            layout, names = [], []
+            for name in ("in_position", "in_normal", "in_color"):
+                layout.append("3f" if name in shader else "12x")
+                names += [name] if name in shader else []
+            content = [(self._vertices, " ".join(layout), *names)]
+            self._arrays[shader] = self.ctx.vertex_array(shader, content)
+        array, start = self._arrays[shader], first * POINT_INSTANCE.itemsize
+        for name, form, offset in PER_INSTANCE:
+            if name in shader:
+                location = shader[name].location  # type: ignore[union-attr]
+                array.bind(
+                    location, "f", self._rows, form, offset=start + offset,
+                    stride=POINT_INSTANCE.itemsize, divisor=1,
+                )  # fmt: skip
+        return array
