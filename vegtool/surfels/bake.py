@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vegtool.arrays import IntArray
+from vegtool.arrays import IntArray, checked
 from vegtool.baking.bake import dilated
 from vegtool.baking.pack import Packing, pack
 from vegtool.baking.sides import compare_sides, pictures_of
@@ -37,6 +37,15 @@ class SurfelAtlas:
 
     atlas: Atlas
     behind: np.ndarray
+
+    def __post_init__(self) -> None:
+        rects = np.concatenate([self.atlas.front, self.atlas.back]).astype(np.int64)
+        height, width = self.atlas.color.shape[:2]
+        beyond = rects[:, :2] + rects[:, 2:] > (width, height)
+        if (rects < (0, 0, 1, 1)).any() or beyond.any():
+            raise ValueError("SurfelAtlas: rectangles must lie in the atlas")
+        behind = checked("SurfelAtlas.behind", self.behind, (len(self.atlas.front),), np.bool_)
+        object.__setattr__(self, "behind", behind)
 
 
 @dataclass(frozen=True, eq=False)
