@@ -64,3 +64,34 @@ def test_alpha_only_grows_and_colours_stay(statue: SurfelModel) -> None:
     assert (after.color[..., 3] <= np.ceil(MOST * old.color[..., 3].astype(float))).all()
     assert np.array_equal(after.color[..., :3], old.color[..., :3])
     assert np.array_equal(before.textures.atlas.color, thinned(statue).textures.atlas.color)
+
+
+def test_backs_grow_as_their_fronts_do(statue: SurfelModel) -> None:
+    before = thinned(statue)
+    old, new = before.textures.atlas, covered_alike(before).textures.atlas
+    own = np.flatnonzero((old.front != old.back).any(axis=1))
+    assert len(own)
+    for front, back in zip(old.front[own], old.back[own], strict=True):
+        grown = [
+            new.color[y : y + h, x : x + w, 3].max() / old.color[y : y + h, x : x + w, 3].max()
+            for x, y, w, h in (front, back)
+        ]
+        assert min(grown) > 1.5, "a third of it was left"
+
+
+def test_what_is_drawn_from_elsewhere_has_another_factor(statue: SurfelModel) -> None:
+    """The finer half has lost its alpha: from near it is won back, and the coarser half, which lost
+    nothing, stays as it is."""
+    atlas, error = statue.textures.atlas, statue.hierarchy.error
+    fine = error < 8 * error.min()
+    assert 0 < fine.sum() < len(fine)
+    color = atlas.color.copy()
+    for x, y, w, h in np.concatenate([atlas.front[fine], atlas.back[fine]]):
+        color[y : y + h, x : x + w, 3] = atlas.color[y : y + h, x : x + w, 3] // 3
+    thin = replace(statue, textures=replace(statue.textures, atlas=replace(atlas, color=color)))
+    solved = covered_alike(thin)
+    pixels = 0.5 * statue.plant.extent / error.min()  # of twice where the finest are drawn first
+    assert bias(thin, pixels) < -0.1 and abs(bias(solved, pixels)) < 0.06
+    for x, y, w, h in atlas.front[error > 32 * error.min()]:
+        before = color[y : y + h, x : x + w, 3].astype(float)
+        assert (solved.textures.atlas.color[y : y + h, x : x + w, 3] <= 1.3 * before + 1).all()
