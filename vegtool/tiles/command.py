@@ -50,7 +50,10 @@ def run_tiles(
 
         return run_surfel_tiles(scene, library, out, options, run, bar)
     if library is None:
-        raise UsageError(f"{scene}: expected --species, the folder of its plants; got none")
+        raise UsageError(
+            f"{scene}: expected --species, the folder of its plants; got none. One plant alone is "
+            "NAME.surfels, as `vegtool convert --method surfel-billboards` writes it"
+        )
     from vegtool.tiles.jobs import Inputs, world_of
 
     started = perf_counter()
