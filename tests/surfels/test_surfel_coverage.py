@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,11 +12,12 @@ from vegtool.gl.surfel_buffers import SurfelBuffers
 from vegtool.gl.upload import PlantBuffers
 from vegtool.growth import sample
 from vegtool.measure.pictures import truth
-from vegtool.measure.views import around, views
+from vegtool.measure.views import Camera, around, framed, views
 from vegtool.surfels.coverage import MOST, covered_alike
 from vegtool.surfels.drawn import drawn_data
 from vegtool.surfels.make import surfel_model
 from vegtool.surfels.model import SurfelModel
+from vegtool.surfels.options import SurfelOptions
 from vegtool.surfels.pictures import pictured
 
 pytestmark = pytest.mark.gl
@@ -95,3 +97,21 @@ def test_what_is_drawn_from_elsewhere_has_another_factor(statue: SurfelModel) ->
     for x, y, w, h in atlas.front[error > 32 * error.min()]:
         before = color[y : y + h, x : x + w, 3].astype(float)
         assert (solved.textures.atlas.color[y : y + h, x : x + w, 3] <= 1.3 * before + 1).all()
+
+
+def test_bands_are_seen_from_where_they_are_drawn_first(
+    statue: SurfelModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An error is so many pixels from the nearest point of the plant."""
+    away = []
+
+    def told(*where: Any) -> Camera:
+        away.append(where[3])
+        return framed(*where)
+
+    monkeypatch.setattr("vegtool.surfels.coverage.framed", told)
+    model = replace(statue, options=SurfelOptions(epsilon=0.25))
+    covered_alike(model)
+    begin = max(away) - model.plant.radius
+    seen = model.hierarchy.error.max() * model.display.pixels_per_metre(begin)
+    assert seen == pytest.approx(0.25)
