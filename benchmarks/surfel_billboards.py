@@ -42,6 +42,7 @@ from vegtool.formats.png import encode
 from vegtool.gl.context import describe
 from vegtool.gl.surfel_buffers import SurfelBuffers
 from vegtool.gl.surfel_choice import frame_of, instances, let_through, taken
+from vegtool.gl.surfel_data import TEXEL_BYTES
 from vegtool.gl.surfel_read import surfels_seen
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lighting.light import Light
@@ -52,7 +53,6 @@ from vegtool.measure.pictures import truth
 from vegtool.measure.views import around, views
 from vegtool.meshes.distance import to_triangles
 from vegtool.plant import Plant
-from vegtool.surfels.bake import BYTES_PER_TEXEL
 from vegtool.surfels.base import base_of
 from vegtool.surfels.drawn import drawn_data
 from vegtool.surfels.hierarchy import whole
@@ -213,7 +213,7 @@ def table(names: Sequence[str], missed: list[str]) -> list[dict[str, Any]]:
         billboards, megabytes = ASKED[name]
         with bench(make()) as on:
             one = on.model.hierarchy
-            taken_mb = BYTES_PER_TEXEL * on.model.textures.atlas.texels / MEGABYTE
+            taken_mb = TEXEL_BYTES * on.model.textures.atlas.texels / MEGABYTE
             moved = on.displaced(np.random.default_rng(0))
             kept = float((moved <= on.model.options.epsilon).mean())
             row = {
@@ -259,11 +259,10 @@ def counts(names: Sequence[str], missed: list[str]) -> list[dict[str, Any]]:
             found = np.array([[on.drawn(on.eye(d, s)) for s in away] for d in directions])
         for each in found:
             without = np.flatnonzero(each[:, 0] == 0)
-            after = each[without[0] :] if len(without) else each[:0]
-            if (np.diff(after, axis=0) > 0).any():
+            if not len(without):
+                missed.append(f"{name}: triangles never come to an end")
+            elif (np.diff(each[without[0] :], axis=0) > 0).any():
                 missed.append(f"{name}: counts rise again beyond the last triangle")
-        if not len(after):
-            missed.append(f"{name}: triangles never come to an end")
         mean = found.mean(axis=0)
         rows += [
             {
@@ -322,7 +321,7 @@ def depth(name: str) -> list[dict[str, Any]]:
                     "mean_depth": round(float(deep / plant.radius), 5),
                     "billboards": len(on.model.hierarchy),
                     "megabytes": round(
-                        BYTES_PER_TEXEL * on.model.textures.atlas.texels / MEGABYTE, 2
+                        TEXEL_BYTES * on.model.textures.atlas.texels / MEGABYTE, 2
                     ),
                     "drawn_at_10": round(float(np.mean([
                         on.drawn(on.eye(view.direction, 10.0))[1] for view in views("all", 6)

@@ -355,6 +355,7 @@ def test_help_shows_what_stands_in_brackets(
     for words in bracketed:
         assert words in said
     assert "\\[" not in said and "[bold]" not in said and "Examples" in said
+    assert not any("{" in text for text in helps), "names of constants are filled in"
 
 
 def test_inspect_writes_branches(model: Path, tmp_path: Path) -> None:

@@ -91,7 +91,7 @@ class ConvertOptions:
         "What clusters of --refine none are like. "
         + "; ".join(f"{k}: {v}" for k, (_, v) in METHODS.items())
         + f". Or, with --refine full, {HYBRID}: planes of which those that are dearer than the "
-        "triangles they show give way to a mesh; {SURFELS}: a hierarchy of billboards over "
+        f"triangles they show give way to a mesh; {SURFELS}: a hierarchy of billboards over "
         "triangles, of which a level has what its distance asks for.",
         choices=(*METHODS, *OF_METHODS),
         short="m",

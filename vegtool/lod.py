@@ -31,6 +31,10 @@ class Display:
     fov_y_deg: float = 60.0
     image_height_px: int = 1080
 
+    def __post_init__(self) -> None:
+        if not (0 < self.fov_y_deg < 180 and self.image_height_px > 0):
+            raise ValueError(f"Display: expected an angle below 180 degrees and pixels; got {self}")
+
     def pixels_per_metre(self, distance_m: float) -> float:
         """Pixels that one metre covers at the centre of the image, that far from the viewer."""
         return self.image_height_px / (2 * tan(radians(self.fov_y_deg) / 2) * distance_m)

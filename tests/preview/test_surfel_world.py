@@ -17,7 +17,6 @@ from vegtool.formats.gltf import plant_glb
 from vegtool.gl.screen import Screen
 from vegtool.growth import sample
 from vegtool.lod import Display
-from vegtool.preview import command
 from vegtool.preview.drawn import show_of
 from vegtool.preview.eye import FOV_Y_DEG
 from vegtool.preview.options import PreviewOptions
@@ -27,7 +26,6 @@ from vegtool.preview.surfel_forest import SurfelForest
 from vegtool.preview.surfel_world import read_surfel_world, surfel_world
 from vegtool.preview.world import read_world
 from vegtool.surfels.make import surfel_model
-from vegtool.surfels.options import SUFFIX
 from vegtool.surfels.store import read_surfels, surfels_bytes
 
 pytestmark = pytest.mark.gl
@@ -50,10 +48,6 @@ def forest(file: Path) -> Iterator[SurfelForest]:
         for _ in made.load():
             pass
         yield made
-
-
-def test_the_extension_is_that_of_the_file() -> None:
-    assert command.SURFELS == SUFFIX
 
 
 def test_it_stands_where_the_model_would(file: Path, tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -12,11 +13,12 @@ from vegtool.convert import ConvertOptions, convert
 from vegtool.errors import UsageError
 from vegtool.gl.upload import PlantBuffers
 from vegtool.growth import sample
-from vegtool.lod import Display
+from vegtool.lod import Display, Level
 from vegtool.measure.chain import views_of
 from vegtool.measure.options import MeasureOptions
 from vegtool.measure.scores import TruthsAt, scores
 from vegtool.refine.level import Wanted, source_of
+from vegtool.surfels.base import base_of
 from vegtool.surfels.cuts import coarsest
 from vegtool.surfels.level import SurfelSource, cut, least_error, surfel_level
 from vegtool.surfels.make import surfel_model
@@ -63,6 +65,71 @@ def test_the_least_error_of_a_budget_spends_it(made_from: SurfelSource) -> None:
         assert cut(model, error).triangles(model.triangles.sizes, 2) <= most
         less = cut(model, np.nextafter(error, 0)).triangles(model.triangles.sizes, 2)
         assert less > 0.97 * most, "counts fall as errors rise, nearly always"
+
+
+def test_errors_are_of_epsilon_from_where_the_plant_begins(made_from: SurfelSource) -> None:
+    """Of what is nearest to the eye; which is how far a budget's errors are from."""
+    model = made_from.model
+    begins = 3 * model.plant.radius
+    seen = made_from.allowed_m(begins) * Display().pixels_per_metre(begins - model.plant.radius)
+    assert seen == pytest.approx(model.options.epsilon)
+    assert made_from.allowed_m(model.plant.radius / 2) == 0, "from inside"
+    error = least_error(model, 300)
+    assert made_from.allowed_m(made_from.nearest_m(300)) == pytest.approx(error)
+
+
+def test_what_alpha_cuts_out_is_off_by_what_it_was_simplified_by(made_from: SurfelSource) -> None:
+    """It has no mesh: its patches stand as they are at the coarsest, whatever is allowed."""
+    model = made_from.model
+    plant = model.plant
+    masked = tuple(replace(material, alpha_mode="mask") for material in plant.materials)
+    mt = replace(model.triangles, plant=replace(plant, materials=masked))
+    chosen = cut(replace(model, triangles=mt), 0.0)
+    assert len(chosen.alone) == len(model.hierarchy.above) and not chosen.arcs.any()
+    assert chosen.error == base_of(mt).error.max()
+
+
+def test_a_level_is_off_by_its_triangles_too(
+    made_from: SurfelSource, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Billboards are measured against the coarsest triangles, these against the original."""
+    monkeypatch.setattr("vegtool.surfels.level.geometric_error", lambda *of: (0.5, 0.2))
+    model = made_from.model
+    wanted = Wanted(10_000, 60 * model.plant.radius)
+    off = cut(model, made_from.allowed_m(wanted.near_m)).error
+    level = surfel_level(made_from, wanted)
+    assert level.geometric_error_m == pytest.approx((0.5 + off, 0.2 + off))
+    assert (off > 0) == (model.plant.name == "statue"), "leaves on cards cannot be simplified"
+
+
+@pytest.mark.parametrize("sided", [False, True])
+def test_a_mesh_is_seen_from_where_its_plant_is(made_from: SurfelSource, sided: bool) -> None:
+    model = made_from.model
+    plant = model.plant
+    materials = tuple(
+        replace(each, double_sided=sided, alpha_mode="opaque") for each in plant.materials
+    )
+    mt = replace(model.triangles, plant=replace(plant, materials=materials))
+    like = SurfelSource(made_from.source, replace(model, triangles=mt))
+    level = surfel_level(like, Wanted(1_500, 20 * plant.radius))
+    assert level.mesh is not None
+    assert [each.double_sided for each in level.mesh.materials] == [sided]
+
+
+def test_of_two_alphas_the_better_one_stays(
+    made_from: SurfelSource, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wanted = Wanted(200, Display().distance_m(60 / made_from.model.plant.extent))
+    usual = surfel_level(made_from, wanted)
+
+    def gone(source: object, wanted: object, level: Level, *rest: object) -> Level:
+        assert level.atlas is not None
+        return replace(level, atlas=replace(level.atlas, color=0 * level.atlas.color))
+
+    monkeypatch.setattr("vegtool.surfels.level.as_measured", gone)
+    left = surfel_level(made_from, wanted)
+    assert left.atlas is not None and left.atlas.color[..., 3].any()
+    assert left.triangles == usual.triangles
 
 
 def test_levels_keep_to_their_budget_and_look_like_the_plant(made_from: SurfelSource) -> None:

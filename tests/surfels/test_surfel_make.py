@@ -9,9 +9,9 @@ import pytest
 from surfel_cases import surface
 
 from vegtool.errors import UsageError
+from vegtool.gl.surfel_data import TEXEL_BYTES
 from vegtool.growth import sample
 from vegtool.plant import Plant
-from vegtool.surfels.bake import BYTES_PER_TEXEL
 from vegtool.surfels.make import surfel_model
 from vegtool.surfels.options import MEGABYTE, SurfelOptions
 from vegtool.surfels.select import left_to_triangles, top_down
@@ -25,8 +25,10 @@ def test_less_memory_is_kept_to_by_beginning_farther_away() -> None:
     found = []
     for megabytes in (32.0, 0.2, 0.02, 0.001):
         model = surfel_model(plant, SurfelOptions(max_texture_memory=megabytes))
-        one, taken = model.hierarchy, BYTES_PER_TEXEL * model.textures.atlas.texels
+        one, taken = model.hierarchy, TEXEL_BYTES * model.textures.atlas.texels
         assert taken <= megabytes * MEGABYTE
+        if megabytes in (0.2, 0.02):
+            assert taken > 0.5 * megabytes * MEGABYTE, "what is allowed is used"
         size = 2 * one.boxes.half[:, :2] / model.texels
         assert (size <= one.error[:, None] * (1 + 1e-9)).all()
         assert bool(model.notes) == (megabytes < 32)
@@ -82,7 +84,7 @@ def test_extremes_have_a_hierarchy_that_shows_all_from_afar(name: str) -> None:
         assert len(drawn) == (one.father < 0).sum() >= 1, "the roots, and nothing else"
         assert not left_to_triangles(one, drawn).any()
         atlas = model.textures.atlas
-        assert BYTES_PER_TEXEL * atlas.texels <= options.max_texture_memory * MEGABYTE
+        assert TEXEL_BYTES * atlas.texels <= options.max_texture_memory * MEGABYTE
 
 
 def test_a_point_is_refused() -> None:

@@ -180,6 +180,23 @@ def test_the_wrong_side_is_dropped(height: float, back: float) -> None:
                     assert one[..., 3].sum() == pytest.approx(whole[..., 3].sum(), rel=0.1)
 
 
+@pytest.mark.parametrize("seen", [False, True])
+def test_triangles_are_dropped_from_behind_too(seen: bool) -> None:
+    """From so near that there are no billboards."""
+    ground = hills(20, 0.0)
+    materials = tuple(replace(one, double_sided=seen) for one in ground.materials)
+    ground = replace(ground, materials=materials)
+    model = surfel_model(ground, display=COARSE)
+    data, pc = drawn_data(model), COARSE.pixels_per_metre(1.0)
+    with SurfelBuffers(data) as surfels:
+        for up, drawn in ((1.0, True), (-1.0, seen)):
+            eye, shot = looking(ground, 60, pc, np.array([0.1, up, 0.1]))
+            what = frame(data, eye.position, pc)
+            assert not surfels_seen(surfels, what, shot).billboard.max() >= 0
+            picture = picture_of_surfels(surfels, what, shot, Light())
+            assert bool(picture.any()) == drawn
+
+
 def test_painted_and_counted(statue: tuple[SurfelModel, SurfelData]) -> None:
     """In colours of their levels; where nothing is wanted, nothing is sent."""
     model, data = statue

@@ -18,7 +18,7 @@ normal, step above | front: x0, y0, width, height in texels | back."""
 ONE_SIDED, ALIKE, DIFFERENT = 0.0, 1.0, 2.0
 """Of a billboard, what is seen from behind: nothing, the front's picture, one of its own."""
 TEXEL_BYTES = 8
-"""Of a pair of textures: colour and coverage, normal and depth."""
+"""Of a pair of RGBA8 textures, not compressed: colour and coverage, normal and depth."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,6 +15,7 @@ from vegtool.formats.atomic import FileSet, check_free
 from vegtool.preview.options import PreviewOptions
 from vegtool.preview.tileset import tileset_at
 from vegtool.progress import Progress
+from vegtool.surfels.options import SUFFIX
 
 if TYPE_CHECKING:
     from vegtool.preview.path import CameraPath
@@ -25,9 +26,6 @@ SEVERAL_FILES = (".gltf", ".obj")
 """Extensions of models whose pictures are files of their own."""
 READING = 0.2
 """Of the progress of what is written: reading files."""
-
-SURFELS = ".surfels"
-"""Extension of surfel billboards."""
 
 Bar = Callable[[str], AbstractContextManager[Progress]]
 """What shows progress, under a title, as long as it is open."""
@@ -181,7 +179,7 @@ def _check_alone(
 
 
 def _is_surfels(path: Path) -> bool:
-    return path.suffix.lower() == SURFELS
+    return path.suffix.lower() == SUFFIX
 
 
 def _check_written(wanted: Wanted, path: CameraPath | None, inputs: list[Path]) -> None:

@@ -11,11 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vegtool.arrays import IntArray
+from vegtool.arrays import IntArray, checked
 from vegtool.baking.bake import dilated
 from vegtool.baking.pack import Packing, pack
 from vegtool.baking.sides import compare_sides, pictures_of
 from vegtool.gl.pictures import draw_pictures
+from vegtool.gl.surfel_data import TEXEL_BYTES
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Atlas, Billboards
 from vegtool.surfels.hierarchy import SurfelHierarchy
@@ -26,8 +27,6 @@ GUTTER = 1
 """Texels around each picture: what a client filters beyond its edge. No mip is used far enough."""
 SAMPLES = 4
 """Per axis and texel."""
-BYTES_PER_TEXEL = 8
-"""Of a pair of RGBA8 textures: colour and alpha, normal and depth."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +36,15 @@ class SurfelAtlas:
 
     atlas: Atlas
     behind: np.ndarray
+
+    def __post_init__(self) -> None:
+        rects = np.concatenate([self.atlas.front, self.atlas.back]).astype(np.int64)
+        height, width = self.atlas.color.shape[:2]
+        beyond = rects[:, :2] + rects[:, 2:] > (width, height)
+        if (rects < (0, 0, 1, 1)).any() or beyond.any():
+            raise ValueError("SurfelAtlas: rectangles must lie in the atlas")
+        behind = checked("SurfelAtlas.behind", self.behind, (len(self.atlas.front),), np.bool_)
+        object.__setattr__(self, "behind", behind)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +64,7 @@ class Planned:
     @property
     def texture_bytes(self) -> int:
         """On the GPU, not compressed."""
-        return BYTES_PER_TEXEL * self.packing.width * self.packing.height
+        return TEXEL_BYTES * self.packing.width * self.packing.height
 
 
 def planned(buffers: PlantBuffers, first: IntArray, one: SurfelHierarchy, max_side: int) -> Planned:

@@ -59,8 +59,14 @@ class SurfelHierarchy:
         }
         for key, value in values.items():
             object.__setattr__(self, key, value)
+        for key in ("father", "above"):
+            rows = values[key]
+            if len(rows) and not -1 <= rows.min() <= rows.max() < count:
+                raise ValueError(f"{name}.{key}: indices must lie in -1..{count - 1}")
+        if not (0 < self.theta <= 1 and self.least >= 0):
+            raise ValueError(f"{name}: expected a share theta of directions, and least in metres")
         has = self.father >= 0
-        if (self.father[has] <= np.flatnonzero(has)).any() or (self.father >= count).any():
+        if (self.father[has] <= np.flatnonzero(has)).any():
             raise ValueError(f"{name}.father: must come after its children")
 
     def __len__(self) -> int:

@@ -46,7 +46,8 @@ class Cut:
 
     by: (p,) int32 the billboard that shows each patch, -1 where none does. alone: (k,) int32
     patches that a billboard of their own shows, since alpha cuts something out of them. arcs: (a,)
-    bool, whose triangles are drawn. error: metres that no triangle is off by more.
+    bool, whose triangles are drawn. error: metres that no triangle is off by more, of these or of
+    those that billboards show.
     """
 
     by: IntArray
@@ -69,8 +70,8 @@ def cut(model: SurfelModel, delta: float) -> Cut:
     arcs = by_error(mt, delta) & ~masked
     arcs[np.flatnonzero(source)[by >= 0]] = False
     alone = np.flatnonzero(masked[source] & (by < 0)).astype(np.int32)
-    applied = mt.error[mt.error <= delta]
-    return Cut(by, alone, arcs, float(applied.max(initial=0.0)))
+    applied = mt.error[mt.error <= delta], mt.error[mt.end[source]][alone]
+    return Cut(by, alone, arcs, max(float(error.max(initial=0.0)) for error in applied))
 
 
 def least_error(model: SurfelModel, most: int, per_billboard: int = ONE_SIDED) -> float:
@@ -102,6 +103,12 @@ class SurfelSource:
         away = least_error(self.model, most) * display.pixels_per_metre(1.0) / epsilon
         return away + self.model.plant.radius
 
+    def allowed_m(self, near_m: float) -> float:
+        """Metres of error that are epsilon pixels from so far away from the plant's center, of what
+        is nearest there."""
+        display, epsilon = self.model.display, self.model.options.epsilon
+        return max(near_m - self.model.plant.radius, 0.0) * epsilon / display.pixels_per_metre(1.0)
+
 
 def surfel_level(made_from: SurfelSource, wanted: Wanted, progress: Progress = silent) -> Level:
     """A level that displaces nothing by more than the model's epsilon at `wanted.near_m`: more
@@ -113,11 +120,12 @@ def surfel_level(made_from: SurfelSource, wanted: Wanted, progress: Progress = s
     """
     source, seconds = made_from.source, dict[str, float]()
     model = made_from.model
-    near_m = max(wanted.near_m - model.plant.radius, 0.0)
-    delta = near_m * model.options.epsilon / model.display.pixels_per_metre(1.0)
     for per_billboard in (ONE_SIDED, TWO_SIDED):
         with timed(seconds, "cut"):
-            error = max(delta, least_error(model, wanted.triangles, per_billboard))
+            error = max(
+                made_from.allowed_m(wanted.near_m),
+                least_error(model, wanted.triangles, per_billboard),
+            )
             chosen = cut(model, error)
         level, geometric = _baked(source, model, chosen, wanted, seconds, progress)
         if level.triangles <= wanted.triangles:

@@ -14,13 +14,14 @@ import numpy as np
 
 from vegtool.baking.options import BakeOptions
 from vegtool.gl.context import describe
+from vegtool.gl.surfel_data import TEXEL_BYTES
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Display
 from vegtool.measure.views import distance_of
 from vegtool.options import check_limits
 from vegtool.plant import Plant
 from vegtool.progress import Progress, part_of, silent
-from vegtool.surfels.bake import BYTES_PER_TEXEL, Planned, baked, planned
+from vegtool.surfels.bake import Planned, baked, planned
 from vegtool.surfels.base import Base, base_of
 from vegtool.surfels.coverage import covered_alike
 from vegtool.surfels.cuts import by_error, coarsest, drawn, triangles
@@ -114,7 +115,7 @@ def _begins_farther(
 ) -> str:  # fmt: skip
     count = len(triangles(mt, by_error(mt, asked)))
     begins, wanted = least / m_per_pixel, asked / m_per_pixel
-    side_mb = BYTES_PER_TEXEL * limit**2 / MEGABYTE
+    side_mb = TEXEL_BYTES * limit**2 / MEGABYTE
     by_side = side_mb < options.max_texture_memory
     return (
         f"textures of {min(side_mb, options.max_texture_memory):.3g} MB are too small: billboards "

@@ -32,6 +32,8 @@ class SurfelModel:
     seconds: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        if not self.plant.extent > 0:
+            raise ValueError("SurfelModel: expected a plant with an extent")
         source = len(self.triangles.error) - 1
         patches = int((self.triangles.start == source).sum())
         if len(self.hierarchy.above) != patches:

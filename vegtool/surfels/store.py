@@ -10,17 +10,19 @@ from __future__ import annotations
 import io
 import json
 import zipfile
+import zlib
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from vegtool.errors import InputError
+from vegtool.errors import InputError, UsageError
 from vegtool.formats import png
 from vegtool.formats.archive import archived
-from vegtool.formats.images import decode
+from vegtool.formats.images import MAX_SIDE, decode
 from vegtool.lod import Atlas, Display
+from vegtool.options import check_limits
 from vegtool.plant import Material, Plant, Texture
 from vegtool.surfels.bake import SurfelAtlas
 from vegtool.surfels.box import SurfelBoxes
@@ -39,6 +41,14 @@ MAYBE_OF_PLANT = ("colors", "exposure")
 OF_TRIANGLES = ("faces", "first", "material", "start", "end", "error", "center", "radius")
 OF_HIERARCHY = ("father", "error", "center", "radius", "above")
 OF_BOXES = ("center", "axes", "half")
+OF_MATERIAL = {
+    "name": str,
+    **{
+        f.name: type(f.default)
+        for f in fields(Material)
+        if isinstance(f.default, str | float | bool)
+    },
+}
 IMAGES = ("color_texture", "normal_texture", "light_texture")
 
 
@@ -91,7 +101,7 @@ def read_surfels(path: Path) -> SurfelModel:
     version."""
     try:
         arrays = _arrays(path)
-        about = json.loads(arrays["about"].tobytes())
+        about = json.loads(arrays["about"].tobytes(), parse_constant=_refused)
         if about["version"] != VERSION:
             raise InputError(
                 f"{path}: expected version {VERSION} of surfel billboards, found "
@@ -102,7 +112,7 @@ def read_surfels(path: Path) -> SurfelModel:
         raise InputError(
             f"{path}: cannot be read ({error.strerror or error}); check the path"
         ) from error
-    except (ValueError, KeyError, TypeError, AttributeError, zipfile.BadZipFile, EOFError) as error:
+    except _BROKEN as error:
         raise InputError(
             f"{path}: expected surfel billboards as `vegtool convert --method surfel-billboards` "
             f"writes them; the file is broken ({error or type(error).__name__}). {_AGAIN}"
@@ -110,6 +120,16 @@ def read_surfels(path: Path) -> SurfelModel:
 
 
 _AGAIN = "Convert the plant again."
+_BROKEN = (
+    ValueError, TypeError, LookupError, AttributeError, ArithmeticError, EOFError, SyntaxError,
+    RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error, UsageError,
+)  # fmt: skip
+"""What numpy, zipfile, zlib, json and Pillow say of a file that is not what it should be, and what
+is said of options out of range."""
+
+
+def _refused(constant: str) -> None:
+    raise ValueError(f"{constant} among its numbers")
 
 
 def _arrays(path: Path) -> dict[str, np.ndarray]:
@@ -133,10 +153,15 @@ def _model(path: Path, arrays: dict[str, np.ndarray], about: dict[str, Any]) -> 
         return decode(arrays[f"image_{number}"].tobytes(), name, f"{path}: image {name}")
 
     def pixels(name: str) -> np.ndarray:
-        from PIL import Image
+        from PIL.PngImagePlugin import PngImageFile  # of any size: `Image.open` has a limit
 
-        with Image.open(io.BytesIO(arrays[f"atlas_{name}"].tobytes()), formats=["PNG"]) as image:
-            return np.asarray(image)
+        try:
+            with PngImageFile(io.BytesIO(arrays[f"atlas_{name}"].tobytes())) as image:
+                if max(image.size) > MAX_SIDE:
+                    raise ValueError(f"{image.width} x {image.height} texels of {name}")
+                return np.asarray(image)
+        except OSError as error:  # of the picture, not of the file
+            raise ValueError(f"{name}: {error}") from error
 
     images: dict[str, Texture | None] = {}
     materials = []
@@ -146,11 +171,12 @@ def _model(path: Path, arrays: dict[str, np.ndarray], about: dict[str, Any]) -> 
             if key not in images:
                 images[key] = texture(told[name])
             told[name] = images[key]
+        told |= {name: kind(told[name]) for name, kind in OF_MATERIAL.items()}
         materials.append(Material(**told))
     of_plant: dict[str, Any] = {name: arrays[f"plant_{name}"] for name in OF_PLANT}
     of_plant |= {name: arrays.get(f"plant_{name}") for name in MAYBE_OF_PLANT}
     plant = Plant(
-        name=about["name"], faces=arrays["plant_faces"],
+        name=str(about["name"]), faces=arrays["plant_faces"],
         face_material=arrays["plant_face_material"], materials=tuple(materials), source=str(path),
         **of_plant,
     )  # fmt: skip
@@ -160,11 +186,13 @@ def _model(path: Path, arrays: dict[str, np.ndarray], about: dict[str, Any]) -> 
         boxes, theta=about["theta"], least=about["least"],
         **{name: arrays[f"billboards_{name}"] for name in OF_HIERARCHY},
     )  # fmt: skip
+    options = SurfelOptions(**{name: float(value) for name, value in about["options"].items()})
+    check_limits(options)
     front, back = arrays["front"], arrays["back"]
     atlas = Atlas(pixels("color"), pixels("normal"), pixels("depth"), front, back)
     return SurfelModel(
         mt, one, SurfelAtlas(atlas, arrays["behind"]), Display(**about["display"]),
-        SurfelOptions(**about["options"]), tuple(about["notes"]),
+        options, tuple(about["notes"]),
     )  # fmt: skip
 
 

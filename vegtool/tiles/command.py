@@ -13,14 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 from vegtool.errors import BatchError, OutputError, UsageError
 from vegtool.progress import Progress
+from vegtool.surfels.options import SUFFIX
 from vegtool.tiles.options import RunOptions, TileOptions
 
 if TYPE_CHECKING:
     from vegtool.tiles.jobs import Failed, Inputs, World
     from vegtool.tiles.run import Each
 
-SURFELS = ".surfels"
-"""Of a file of surfel billboards, as surfels/store.py writes it."""
 Bar = Callable[[str], AbstractContextManager[Progress]]
 """What shows progress, under a title, as long as it is open."""
 
@@ -46,12 +45,15 @@ def run_tiles(
     Raises UsageError and InputError for what is missing or broken, OutputError where nothing can be
     written, CapabilityError where nothing can draw.
     """
-    if scene.suffix.lower() == SURFELS:
+    if scene.suffix.lower() == SUFFIX:
         from vegtool.tiles.surfel_tiles import run_surfel_tiles
 
         return run_surfel_tiles(scene, library, out, options, run, bar)
     if library is None:
-        raise UsageError(f"{scene}: expected --species, the folder of its plants; got none")
+        raise UsageError(
+            f"{scene}: expected --species, the folder of its plants; got none. One plant alone is "
+            "NAME.surfels, as `vegtool convert --method surfel-billboards` writes it"
+        )
     from vegtool.tiles.jobs import Inputs, world_of
 
     started = perf_counter()
