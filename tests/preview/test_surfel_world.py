@@ -145,7 +145,7 @@ def test_several_stand_in_a_row(file: Path) -> None:
 
 def test_what_hangs_in_the_air_stands_on_the_ground() -> None:
     plant = sample("statue", 500)
-    plant = replace(plant, positions=plant.positions + [0.0, 3.0, 0.0])
+    plant = replace(plant, positions=plant.positions + np.array([0.0, 3.0, 0.0]))
     world = surfel_world([surfel_model(plant)], HEIGHT)
     assert world.foot[0, 1] == pytest.approx(-plant.bounds[0, 1])
     assert 0 > world.height_at(0.0, 0.0) > -0.1 * plant.extent
