@@ -353,7 +353,9 @@ def convert(
         from vegtool.surfels.store import surfels_bytes
 
         model = make.made_from.model
-        misses, beside = model.notes, {SUFFIX: surfels_bytes(model)}
+        misses, beside = model.notes, {SUFFIX: surfels_bytes(model.without_exposure())}
+        if sun is not None or plant.exposure is not None:
+            notes = (*notes, f"light that is baked is in the levels, not in {plant.name}{SUFFIX}")
     progress("levels", 1.0)
     told = {**asdict(options), **asdict(measure)}
     baked = {} if sun is None else sun.as_dict()

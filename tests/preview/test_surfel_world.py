@@ -143,6 +143,14 @@ def test_several_stand_in_a_row(file: Path) -> None:
         assert len(np.unique(seen.reshape(-1, 4), axis=0)) > 100
 
 
+def test_what_hangs_in_the_air_stands_on_the_ground() -> None:
+    plant = sample("statue", 500)
+    plant = replace(plant, positions=plant.positions + np.array([0.0, 3.0, 0.0]))
+    world = surfel_world([surfel_model(plant)], HEIGHT)
+    assert world.foot[0, 1] == pytest.approx(-plant.bounds[0, 1])
+    assert 0 > world.height_at(0.0, 0.0) > -0.1 * plant.extent
+
+
 def test_the_command_writes_pictures_and_figures(
     file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

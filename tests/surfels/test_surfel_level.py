@@ -5,23 +5,29 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from vegtool.convert import ConvertOptions, convert
 from vegtool.errors import UsageError
+from vegtool.gl.surfel_buffers import SurfelBuffers
 from vegtool.gl.upload import PlantBuffers
 from vegtool.growth import sample
 from vegtool.lod import Display, Level
 from vegtool.measure.chain import views_of
 from vegtool.measure.options import MeasureOptions
 from vegtool.measure.scores import TruthsAt, scores
+from vegtool.measure.views import around
 from vegtool.refine.level import Wanted, source_of
 from vegtool.surfels.base import base_of
 from vegtool.surfels.cuts import coarsest
+from vegtool.surfels.drawn import drawn_data
 from vegtool.surfels.level import SurfelSource, cut, least_error, surfel_level
 from vegtool.surfels.make import surfel_model
+from vegtool.surfels.pictures import pictured
+from vegtool.surfels.store import read_surfels
 from vegtool.surfels.validity import spread
 
 pytestmark = pytest.mark.gl
@@ -157,6 +163,27 @@ def test_a_chain_has_distances_by_its_budget() -> None:
     assert sized.levels[1].near_distance_m == pytest.approx(
         Display().distance_m(40 / plant.extent), rel=0.01
     )
+
+
+def test_light_that_is_baked_stays_in_the_levels(tmp_path: Path) -> None:
+    """Of the native file billboards have none, so triangles must not: both are as bright."""
+    plant, off = sample("statue", 1500), MeasureOptions(measure="off")
+    options = ConvertOptions(method="surfel-billboards", levels=1, occlusion=1.0)
+    chain = convert(plant, options, off)
+    assert "light that is baked is in the levels, not in statue.surfels" in chain.notes
+    assert chain.levels[0].mesh is not None and chain.levels[0].mesh.exposure is not None
+    file = tmp_path / "statue.surfels"
+    file.write_bytes(chain.beside[".surfels"])
+    model = read_surfels(file)
+    assert model.plant.exposure is None
+    bright = []
+    with SurfelBuffers(drawn_data(model)) as surfels:
+        for radii in (3.0, 40.0):
+            away = radii * plant.radius
+            camera = around(plant.positions, np.array([1.0, 0, 1]), away, Display())
+            seen = pictured(surfels, model, camera)
+            bright.append(float(seen[..., :3].sum() / seen[..., 3].sum()))
+    assert bright[1] == pytest.approx(bright[0], rel=0.06)
 
 
 def test_options_of_other_methods_are_refused() -> None:

@@ -121,6 +121,19 @@ def test_both_sides_are_drawn_where_something_is_behind(tmp_path: Path) -> None:
             assert (np.einsum("ni,ni->n", turn, normal) > 0).all(), "counter-clockwise"
 
 
+def test_what_is_not_lit_is_not_lit_from_afar(tmp_path: Path) -> None:
+    ground = hills(8)
+    plant = replace(ground, materials=[replace(m, unlit=True) for m in ground.materials])
+    model = surfel_model(plant, display=COARSE)
+    root = tiles_of(model)
+    written(model, tmp_path, root)
+    for number, _ in enumerate(root.all()):
+        for material in open_gltf(tmp_path / f"model_{number}.glb").json["materials"]:
+            assert "KHR_materials_unlit" in material["extensions"]
+            assert "normalTexture" not in material
+    assert [file.name for file in tmp_path.glob("*.png")] == ["model_color.png"]
+
+
 def test_the_same_model_the_same_bytes() -> None:
     model = surfel_model(sample("statue", 2000))
     one, other = (dict(surfel_tileset(model, tiles_of(model), "a b")) for _ in range(2))

@@ -5,7 +5,7 @@ Holst, Schumann: Surfel-based billboard hierarchies for fast rendering of 3D-obj
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -48,6 +48,12 @@ class SurfelModel:
     def plant(self) -> Plant:
         """The original: its vertices are those of all triangles."""
         return self.triangles.plant
+
+    def without_exposure(self) -> SurfelModel:
+        """The same under all of the sky's light: textures of billboards do not tell how much of it
+        reaches a place, and triangles that do would be darker than the billboards above them."""
+        plant = replace(self.plant, exposure=None)
+        return replace(self, triangles=replace(self.triangles, plant=plant))
 
     @property
     def texels(self) -> np.ndarray:

@@ -93,10 +93,13 @@ class _Writer:
 
     @cached_property
     def sheet(self) -> SheetFiles:
-        """The pictures of all billboards."""
-        bumped = self.model.textures.atlas.normal is not None
+        """The pictures of all billboards; where none of the plant is lit, they are not either."""
+        unlit = all(material.unlit for material in self.plant.materials)
+        bumped = self.model.textures.atlas.normal is not None and not unlit
         color, normal = f"{self.stem}_color.png", f"{self.stem}_normal.png"
-        return SheetFiles(color, normal if bumped else None, double_sided=False, averaged=False)
+        return SheetFiles(
+            color, normal if bumped else None, double_sided=False, unlit=unlit, averaged=False
+        )
 
     @cached_property
     def _of_plant(self) -> dict[str, tuple[int, bytes]]:
@@ -116,8 +119,8 @@ class _Writer:
         atlas, files = self.model.textures.atlas, {}
         if len(self.model.hierarchy):
             files[str(self.sheet.color)] = png.encode(atlas.color)
-            if atlas.normal is not None:
-                files[str(self.sheet.normal)] = png.encode(atlas.normal)
+            if atlas.normal is not None and self.sheet.normal is not None:
+                files[self.sheet.normal] = png.encode(atlas.normal)
         return files | {file: data for file, (_, data) in self._of_plant.items()}
 
     def content(self, tile: SurfelTile, number: int) -> tuple[FloatArray, bytes]:
