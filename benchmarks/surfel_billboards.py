@@ -153,8 +153,8 @@ class Bench:
         off = off_surface(np.concatenate(points), plant)
         return np.asarray(np.concatenate(moved) + off * np.concatenate(scale))
 
-    def errors(self) -> list[float]:
-        """Mean FLIP at each of SIZES."""
+    def errors(self, metric: str = "flip") -> list[float]:
+        """Mean of a metric at each of SIZES."""
         plant, found = self.model.plant, []
         with PlantBuffers(plant) as original:
             for pixels in SIZES:
@@ -165,7 +165,7 @@ class Bench:
                     light = Light(view.sun)
                     true = reference(truth(original, camera, light))
                     errs.append(
-                        score(true, pictured(self.buffers, self.model, camera, light))["flip"]
+                        score(true, pictured(self.buffers, self.model, camera, light))[metric]
                     )
                 found.append(float(np.mean(errs)))
         return found
@@ -234,6 +234,8 @@ def table(names: Sequence[str], missed: list[str]) -> list[dict[str, Any]]:
                 row[f"at_{sides:g}"] = f"{mean[0]:,} + {mean[1]:,}"
             for pixels, error in zip(SIZES, on.errors(), strict=True):
                 row[f"flip_{pixels:g}"] = round(error, 4)
+            for pixels, error in zip(SIZES, on.errors("false_holes"), strict=True):
+                row[f"holes_{pixels:g}"] = round(error, 4)
         rows.append(told(row))
         for what, found, asked in (
             ("billboards", len(one), billboards), ("megabytes", taken_mb, megabytes),
