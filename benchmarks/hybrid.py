@@ -30,7 +30,7 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from recorded import record, written
+from recorded import markdown, record, written
 from solids.airplane import airplane
 from solids.figure import figure
 
@@ -268,17 +268,6 @@ def near(models: Sequence[Plant]) -> list[dict[str, Any]]:
     return rows
 
 
-def table(rows: Sequence[dict[str, Any]]) -> str:
-    keys = list(rows[0])
-    lines = [" | ".join(key.replace("_", " ") for key in keys), "|".join("---" for _ in keys)]
-    lines += [" | ".join(_words(row[key]) for key in keys) for row in rows]
-    return "\n".join(f"| {line} |" if "---" not in line else f"|{line}|" for line in lines)
-
-
-def _words(value: Any) -> str:
-    return f"{value:,}" if isinstance(value, int) else str(value)
-
-
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--parts", default=",".join(PARTS))
@@ -319,7 +308,7 @@ def main() -> int:
             record(f"hybrid_{name}", [{**machine, **row} for row in rows])
     if given.markdown:
         for name, rows in found.items():
-            written(PAGE, MARK.format(name), table(rows))
+            written(PAGE, MARK.format(name), markdown(rows))
     if given.figures is not None:
         for name, pixels in pictures.items():
             file = given.figures / f"{name}.png"

@@ -30,7 +30,7 @@ from time import process_time
 from typing import Any
 
 import numpy as np
-from recorded import record, written
+from recorded import markdown, record, written
 from scipy.spatial import cKDTree
 from solids import TABLE_1
 from solids.armadillo import armadillo
@@ -447,17 +447,6 @@ def main() -> int:
     for sentence in missed:
         say(f"missed: {sentence}")
     return 1 if missed else 0
-
-
-def markdown(rows: Sequence[dict[str, Any]]) -> str:
-    keys = list(rows[0])
-    lines = [" | ".join(key.replace("_", " ") for key in keys), "|".join("---" for _ in keys)]
-    lines += [" | ".join(_words(row[key]) for key in keys) for row in rows]
-    return "\n".join(f"| {line} |" if "---" not in line else f"|{line}|" for line in lines)
-
-
-def _words(value: Any) -> str:
-    return f"{value:,}" if isinstance(value, int) else str(value)
 
 
 if __name__ == "__main__":

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vegtool.gl.draw import Shot
+from vegtool.gl.draw import Shot, pictured
 from vegtool.gl.points import Points, PointsBuffers
-from vegtool.gl.surfel_draw import pictured
 from vegtool.lighting.light import Light
 from vegtool.lod import Display
 from vegtool.measure.views import framed

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 from weakref import WeakKeyDictionary
@@ -79,6 +79,26 @@ def tiles(ctx: moderngl.Context, shot: Shot, supersample: int) -> Iterator[tuple
         crop[0, 0], crop[0, 3] = shot.width / width, (shot.width - 2 * x - width) / width
         crop[1, 1], crop[1, 3] = shot.height / height, (2 * y + height - shot.height) / height
         yield x, y, Shot(crop @ shot.view_projection, shot.target, width, height)
+
+
+def pictured(
+    ctx: moderngl.Context, shot: Shot, render: Callable[[Shot], None], supersample: int,
+    samples: int,
+) -> Picture:  # fmt: skip
+    """What is rendered of a shot, part by part, as light and coverage."""
+    whole = np.empty((shot.height, shot.width, 4), np.float32)
+    with framebuffer_kept(ctx):
+        for x, y, part in tiles(ctx, shot, supersample):
+            size = supersample * part.width, supersample * part.height
+            drawn = drawing_target(ctx, size, samples)
+            begin(drawn, size)
+            render(part)
+            pixels = resolved(ctx, drawn, (part.width, part.height), supersample, samples)
+            data = pixels.frame.read((0, 0, part.width, part.height), components=4, dtype="f4")
+            found = np.frombuffer(data, np.float32).reshape(part.height, part.width, 4)
+            whole[y : y + part.height, x : x + part.width] = found
+        check(ctx)
+    return whole
 
 
 def draw_tile(

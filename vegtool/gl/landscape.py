@@ -14,8 +14,8 @@ import numpy as np
 
 from vegtool.arrays import ByteArray, FloatArray, IntArray, Picture
 from vegtool.elements import Elements
-from vegtool.gl.context import OnGpu, check, context, framebuffer_kept
-from vegtool.gl.draw import ANISOTROPY, Shot, begin, resolved, set_footprint, set_light, tiles
+from vegtool.gl.context import OnGpu, context
+from vegtool.gl.draw import ANISOTROPY, Shot, pictured, set_footprint, set_light
 from vegtool.gl.instances import (
     INSTANCE,
     NOISE,
@@ -26,7 +26,6 @@ from vegtool.gl.instances import (
 )
 from vegtool.gl.pace import Pace
 from vegtool.gl.program import program
-from vegtool.gl.targets import drawing_target
 from vegtool.gl.upload import Textures
 from vegtool.lighting.light import Light
 from vegtool.plant import Plant
@@ -218,20 +217,11 @@ def picture(
     ground: bool = True,
 ) -> Picture:
     """A frame as light and coverage, as `gl.draw.draw` gives them of one plant."""
-    ctx = landscape.ctx
-    whole = np.empty((shot.height, shot.width, 4), np.float32)
-    with framebuffer_kept(ctx):
-        for x, y, part in tiles(ctx, shot, supersample):
-            size = supersample * part.width, supersample * part.height
-            drawn = drawing_target(ctx, size, samples)
-            begin(drawn, size)
-            landscape.draw(frame, part, light, ground=ground)
-            pixels = resolved(ctx, drawn, (part.width, part.height), supersample, samples)
-            data = pixels.frame.read((0, 0, part.width, part.height), components=4, dtype="f4")
-            found = np.frombuffer(data, np.float32).reshape(part.height, part.width, 4)
-            whole[y : y + part.height, x : x + part.width] = found
-        check(ctx)
-    return whole
+
+    def render(part: Shot) -> None:
+        landscape.draw(frame, part, light, ground=ground)
+
+    return pictured(landscape.ctx, shot, render, supersample, samples)
 
 
 class _Ground:

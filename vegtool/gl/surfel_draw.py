@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import moderngl
-import numpy as np
 
 from vegtool.arrays import FloatArray, Picture
-from vegtool.gl.context import check, framebuffer_kept
-from vegtool.gl.draw import ANISOTROPY, Shot, begin, resolved, set_footprint, set_light, tiles
+from vegtool.gl.draw import ANISOTROPY, Shot, pictured, set_footprint, set_light
 from vegtool.gl.instances import OVERDRAW_STEP, View
 from vegtool.gl.program import program
 from vegtool.gl.surfel_buffers import SurfelBuffers
 from vegtool.gl.surfel_choice import SurfelFrame
-from vegtool.gl.targets import drawing_target
 from vegtool.gl.upload import MaterialGroup
 from vegtool.lighting.light import Light
 
@@ -90,26 +86,6 @@ def picture_of_surfels(
         draw_surfels(model, frame, part, light, samples=samples, footprint=supersample, parts=parts)
 
     return pictured(model.ctx, shot, render, supersample, samples)
-
-
-def pictured(
-    ctx: moderngl.Context, shot: Shot, render: Callable[[Shot], None], supersample: int,
-    samples: int,
-) -> Picture:  # fmt: skip
-    """What is rendered of a shot, part by part, as light and coverage."""
-    whole = np.empty((shot.height, shot.width, 4), np.float32)
-    with framebuffer_kept(ctx):
-        for x, y, part in tiles(ctx, shot, supersample):
-            size = supersample * part.width, supersample * part.height
-            drawn = drawing_target(ctx, size, samples)
-            begin(drawn, size)
-            render(part)
-            pixels = resolved(ctx, drawn, (part.width, part.height), supersample, samples)
-            data = pixels.frame.read((0, 0, part.width, part.height), components=4, dtype="f4")
-            found = np.frombuffer(data, np.float32).reshape(part.height, part.width, 4)
-            whole[y : y + part.height, x : x + part.width] = found
-        check(ctx)
-    return whole
 
 
 def billboard_program(

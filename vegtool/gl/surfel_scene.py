@@ -9,13 +9,13 @@ import numpy as np
 
 from vegtool.arrays import FloatArray, Picture
 from vegtool.gl.context import OnGpu
-from vegtool.gl.draw import MSAA, Shot
+from vegtool.gl.draw import MSAA, Shot, pictured
 from vegtool.gl.instances import INSTANCE, View
 from vegtool.gl.landscape import Drawn, Frame, GroundMesh, Landscape
 from vegtool.gl.surfel_buffers import SurfelBuffers
 from vegtool.gl.surfel_choice import SurfelFrame
 from vegtool.gl.surfel_data import SurfelData
-from vegtool.gl.surfel_draw import BOTH, Parts, draw_surfels, pictured
+from vegtool.gl.surfel_draw import BOTH, Parts, draw_surfels
 from vegtool.lighting.light import Light
 
 NOTHING = Frame(np.zeros(0, INSTANCE), ())
