@@ -26,7 +26,7 @@ from vegtool.gl.instances import (
 )
 from vegtool.gl.pace import Pace
 from vegtool.gl.program import program
-from vegtool.gl.upload import Textures
+from vegtool.gl.upload import Textures, rewritten
 from vegtool.lighting.light import Light
 from vegtool.plant import Plant
 
@@ -157,7 +157,7 @@ class Landscape(OnGpu):
 
         shot: its target is the eye, relative to which the rows are.
         """
-        self._write(frame.rows)
+        self._rows = rewritten(self._rows, frame.rows)
         if view == "overdraw":
             self.ctx.enable_only(moderngl.BLEND)
             self.ctx.blend_func = moderngl.ONE, moderngl.ONE
@@ -196,14 +196,6 @@ class Landscape(OnGpu):
                 draws += bool(drawn)
                 triangles += drawn
         return draws, triangles
-
-    def _write(self, rows: np.ndarray) -> None:
-        size = max(rows.nbytes, 1)
-        if self._rows.size < size:
-            self._rows.release()
-            self._rows = self.ctx.buffer(reserve=size * 3 // 2, dynamic=True)
-        self._rows.orphan(self._rows.size)
-        self._rows.write(np.ascontiguousarray(rows))
 
 
 def picture(

@@ -17,6 +17,7 @@ from vegtool.gl.draw import Shot, set_sky
 from vegtool.gl.instances import OVERDRAW_STEP, View
 from vegtool.gl.pace import Pace
 from vegtool.gl.program import program
+from vegtool.gl.upload import rewritten
 from vegtool.lighting.light import Light
 
 POINT_INSTANCE = np.dtype([("place", "f4", 4), ("turn_size", "f4", 3)])
@@ -118,7 +119,7 @@ class PointsBuffers(OnGpu):
         order = np.argsort(-prefix, kind="stable")
         order = order[prefix[order] > 0]
         count = np.minimum(prefix[order], len(self.points.position))
-        self._write(rows[order])
+        self._rows = rewritten(self._rows, rows[order])
         self.ctx.enable(moderngl.PROGRAM_POINT_SIZE)
         starts = np.flatnonzero(np.diff(np.ceil(np.log2(count)), prepend=np.inf))
         sent = 0
@@ -130,13 +131,6 @@ class PointsBuffers(OnGpu):
             sent += most * int(end - first)
         self.ctx.disable(moderngl.PROGRAM_POINT_SIZE)
         return sent
-
-    def _write(self, rows: np.ndarray) -> None:
-        if self._rows.size < rows.nbytes:
-            self._rows.release()
-            self._rows = self.ctx.buffer(reserve=rows.nbytes * 3 // 2, dynamic=True)
-        self._rows.orphan(self._rows.size)
-        self._rows.write(np.ascontiguousarray(rows))
 
     def _array(self, shader: moderngl.Program, first: int) -> moderngl.VertexArray:
         if shader not in self._arrays:

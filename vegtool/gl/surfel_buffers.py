@@ -10,7 +10,7 @@ from vegtool.gl.context import OnGpu
 from vegtool.gl.pace import Pace
 from vegtool.gl.surfel_choice import SURFEL_INSTANCE, Run, SurfelFrame
 from vegtool.gl.surfel_data import SurfelData, SurfelPatches
-from vegtool.gl.upload import SRGB8_ALPHA8, MaterialGroup, PlantBuffers
+from vegtool.gl.upload import SRGB8_ALPHA8, MaterialGroup, PlantBuffers, rewritten
 
 PER_INSTANCE = (
     ("in_place", "f", "4f", 0), ("in_eye", "f", "3f", 16), ("in_turn", "f", "2f", 28),
@@ -73,12 +73,7 @@ class SurfelBuffers(OnGpu):
 
     def write(self, rows: np.ndarray) -> None:
         """Tell of the instances of a frame, (n,) SURFEL_INSTANCE."""
-        size = max(rows.nbytes, 1)
-        if self._rows.size < size:
-            self._rows.release()
-            self._rows = self.ctx.buffer(reserve=size * 3 // 2, dynamic=True)
-        self._rows.orphan(self._rows.size)
-        self._rows.write(np.ascontiguousarray(rows))
+        self._rows = rewritten(self._rows, rows)
 
     def use(self, shader: moderngl.Program, pixels: float) -> None:
         """Bind what programs of surfels read, and set their uniforms."""

@@ -286,6 +286,18 @@ def _layout(floats: int) -> str:
     return " ".join([f"{floats}f"] * bool(floats) + [f"{4 * (4 - floats)}x"] * (floats < 4))
 
 
+def rewritten(buffer: moderngl.Buffer, rows: np.ndarray) -> moderngl.Buffer:
+    """A buffer with other rows in it, of one frame after another: the same, or a larger one where
+    that is too small, which is then released."""
+    if buffer.size < rows.nbytes:
+        ctx = buffer.ctx
+        buffer.release()
+        buffer = ctx.buffer(reserve=rows.nbytes * 3 // 2, dynamic=True)
+    buffer.orphan(buffer.size)
+    buffer.write(np.ascontiguousarray(rows))
+    return buffer
+
+
 def bled_under_alpha(pixels: ByteArray) -> ByteArray:
     """The image with the first ring of texels under alpha 0 given their neighbours' mean colour.
 
