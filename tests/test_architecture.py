@@ -14,7 +14,7 @@ PACKAGE = Path(__file__).parent.parent / "vegtool"
 
 GROUND = {
     "errors", "arrays", "options", "progress", "seeding", "srgb", "timing",
-    "plant", "lod", "vegtool",
+    "plant", "lod", "surfel_set", "vegtool",
 }  # fmt: skip
 """Contracts that every room may import."""
 

@@ -6,24 +6,25 @@ import numpy as np
 import pytest
 
 from vegtool.gl.draw import Shot, pictured
-from vegtool.gl.points import Points, PointsBuffers
+from vegtool.gl.points import SurfelSetBuffers
 from vegtool.lighting.light import Light
 from vegtool.lod import Display
 from vegtool.measure.views import framed
+from vegtool.surfel_set import Spacing, SurfelSet
 
 pytestmark = pytest.mark.gl
 Z = np.array([0.0, 0, 1])
 
 
 def drawn(
-    points: Points, radius: float, prefix: int, direction: np.ndarray = Z, turn: float = 0.0
+    surfels: SurfelSet, radius: float, prefix: int, direction: np.ndarray = Z, turn: float = 0.0
 ) -> np.ndarray:
     """From ten metres away, a metre is 93.5 pixels."""
     camera = framed(np.zeros(3), 1.5, direction, 10.0, Display())
     moved = np.eye(4)
     moved[:3, 3] = camera.eye - camera.target
     shot = Shot(camera.view_projection() @ moved, camera.eye, camera.width, camera.height)
-    with PointsBuffers(points) as buffers:
+    with SurfelSetBuffers(surfels) as buffers:
         rows = buffers.instances(
             camera.eye, np.zeros((1, 3)), np.array([turn]), np.ones(1), np.array([radius])
         )
@@ -33,9 +34,9 @@ def drawn(
         )  # fmt: skip
 
 
-def of(*rows: tuple[tuple[float, float, float], tuple[float, float, float]]) -> Points:
+def of(*rows: tuple[tuple[float, float, float], tuple[float, float, float]]) -> SurfelSet:
     position, normal = (np.array(part, dtype=float) for part in zip(*rows, strict=True))
-    return Points(position, normal, np.ones_like(position))
+    return SurfelSet(position, normal, np.ones_like(position), Spacing(1, 0.0, len(position)))
 
 
 ONE = of(((0, 0, 0), (0, 0, 1)), ((1, 0, 0), (0, 0, 1)))
@@ -68,10 +69,10 @@ def test_a_turn_of_the_plant_is_a_turn_of_the_eye() -> None:
 
 def test_discs_cut_each_other_where_their_planes_meet() -> None:
     """Two crossed discs: from between them, each shows the half that is nearer."""
-    crossed = Points(
+    crossed = SurfelSet(
         np.array([[0, 0, 0], [0, 0, 0], [1, 1, 1e-9]], dtype=float),
         np.array([[1, 0, 1], [-1, 0, 1], [0, 0, 1]]) / np.array([[2**0.5], [2**0.5], [1]]),
-        np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 0]]), unlit=True,
+        np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 0]]), Spacing(1, 0.0, 3), unlit=True,
     )  # fmt: skip
     picture = drawn(crossed, 0.3, 2)
     left, right = np.array_split(picture[..., :2].sum(axis=0), 2)

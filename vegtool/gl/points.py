@@ -6,12 +6,10 @@ section 4.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import moderngl
 import numpy as np
 
-from vegtool.arrays import FloatArray, IntArray, checked
+from vegtool.arrays import FloatArray, IntArray
 from vegtool.gl.context import OnGpu, context
 from vegtool.gl.draw import Shot, set_sky
 from vegtool.gl.instances import OVERDRAW_STEP, View
@@ -19,6 +17,7 @@ from vegtool.gl.pace import Pace
 from vegtool.gl.program import program
 from vegtool.gl.upload import rewritten
 from vegtool.lighting.light import Light
+from vegtool.surfel_set import SurfelSet
 
 POINT_INSTANCE = np.dtype([("place", "f4", 4), ("turn_size", "f4", 3)])
 """place: metres from the eye to the points' center, and metres of a unit. turn_size: cosine and
@@ -27,35 +26,17 @@ PER_INSTANCE = (("in_place", "4f", 0), ("in_turn_size", "3f", 16))
 """Attributes: name, format and offset."""
 
 
-@dataclass(frozen=True, eq=False)
-class Points:
-    """n surfels, of which any first part is a picture of the whole. position: (n, 3) metres.
-    normal: (n, 3) unit. color: (n, 3) linear. unlit: colours are what is seen."""
-
-    position: FloatArray
-    normal: FloatArray
-    color: FloatArray
-    unlit: bool = False
-
-    def __post_init__(self) -> None:
-        position = checked("Points.position", self.position, (None, 3), np.float64)
-        object.__setattr__(self, "position", position)
-        for name in ("normal", "color"):
-            value = checked(f"Points.{name}", getattr(self, name), position.shape, np.float64)
-            object.__setattr__(self, name, value)
-
-
-class PointsBuffers(OnGpu):
+class SurfelSetBuffers(OnGpu):
     """Surfels on the GPU, relative to their middle in units of their radius, both as they are
     bounded. A context manager: leaving releases."""
 
-    def __init__(self, points: Points, *, ctx: moderngl.Context | None = None) -> None:
-        self.points, self.ctx = points, ctx or context()
-        low, high = points.position.min(axis=0), points.position.max(axis=0)
+    def __init__(self, surfels: SurfelSet, *, ctx: moderngl.Context | None = None) -> None:
+        self.surfels, self.ctx = surfels, ctx or context()
+        low, high = surfels.bounds
         self.center = (low + high) / 2
         self.unit = float(np.linalg.norm(high - low) / 2) or 1.0
-        local = (points.position - self.center) / self.unit
-        rows = np.concatenate([local, points.normal, points.color], axis=1).astype(np.float32)
+        local = (surfels.position - self.center) / self.unit
+        rows = np.concatenate([local, surfels.normal, surfels.color], axis=1).astype(np.float32)
         self._vertices = self.ctx.buffer(np.ascontiguousarray(rows))
         self._rows = self.ctx.buffer(reserve=POINT_INSTANCE.itemsize, dynamic=True)
         self._arrays: dict[moderngl.Program, moderngl.VertexArray] = {}
@@ -89,6 +70,19 @@ class PointsBuffers(OnGpu):
         rows["turn_size"] = np.stack([cosine, sine, radius / self.unit], axis=1)
         return rows
 
+    def pixels(
+        self, eye: FloatArray, foot: FloatArray, turn: FloatArray, scale: FloatArray, focal: float
+    ) -> FloatArray:
+        """(n,) metres, before scaling, of a pixel at what is nearest to an eye of the bounds of
+        the surfels at each of n places; section 4.1. focal: pixels of a metre at a distance of
+        one."""
+        x, y, z = ((eye - foot) / scale[:, None]).T
+        cosine, sine = np.cos(turn), np.sin(turn)
+        own = np.stack([cosine * x - sine * z, y, cosine * z + sine * x], axis=1)
+        low, high = self.surfels.bounds
+        away = np.linalg.norm(own - np.clip(own, low, high), axis=1)
+        return np.asarray(away / focal)
+
     def draw(
         self, rows: np.ndarray, prefix: IntArray, shot: Shot, light: Light, view: View = "lit",
         paint: tuple[float, float, float] | None = None, footprint: float = 1.0,
@@ -100,7 +94,7 @@ class PointsBuffers(OnGpu):
         are alike to a power of two are one call, and have as many as the longest.
         """
         defines = {
-            "UNLIT": self.points.unlit, "PAINTED": paint is not None,
+            "UNLIT": self.surfels.unlit, "PAINTED": paint is not None,
             f"OVERDRAW {OVERDRAW_STEP}": view == "overdraw",
         }  # fmt: skip
         told = [name for name, wanted in defines.items() if wanted]
@@ -118,7 +112,7 @@ class PointsBuffers(OnGpu):
         set_sky(shader, light)
         order = np.argsort(-prefix, kind="stable")
         order = order[prefix[order] > 0]
-        count = np.minimum(prefix[order], len(self.points.position))
+        count = np.minimum(prefix[order], len(self.surfels.position))
         self._rows = rewritten(self._rows, rows[order])
         self.ctx.enable(moderngl.PROGRAM_POINT_SIZE)
         starts = np.flatnonzero(np.diff(np.ceil(np.log2(count)), prepend=np.inf))

@@ -7,7 +7,8 @@ import numpy as np
 from vegtool.arrays import FloatArray, Picture
 from vegtool.gl.context import context, describe
 from vegtool.gl.count import count_fragments
-from vegtool.gl.draw import ANISOTROPY, MSAA, Shot, draw
+from vegtool.gl.draw import ANISOTROPY, MSAA, Shot, draw, pictured
+from vegtool.gl.points import SurfelSetBuffers
 from vegtool.gl.sun import SunMaps
 from vegtool.gl.targets import drawing_target
 from vegtool.gl.timing import time_frames
@@ -100,6 +101,26 @@ def live(
     """
     shot, light = shot_of(camera), light or Light()
     return draw(buffers, shot, light, samples=MSAA, anisotropy=anisotropy, shadows=shadows)
+
+
+def live_surfels(
+    buffers: SurfelSetBuffers, camera: Camera, light: Light | None = None, size_px: float = 1.0
+) -> Picture:
+    """What our own viewer shows of surfels: discs of a diameter, in pixels, where there are as many
+    as that takes; 4x multisampling."""
+    shot, light, one = shot_of(camera), light or Light(), np.ones(1)
+    foot, eye = np.zeros((1, 3)), camera.eye
+    pixel = buffers.pixels(eye, foot, 0 * one, one, camera.focal_px)
+    prefix, radius = buffers.surfels.discs(size_px * pixel / 2)
+    rows = buffers.instances(eye, foot, 0 * one, one, radius)
+    moved = np.eye(4)
+    moved[:3, 3] = eye - camera.target
+    seen = Shot(shot.view_projection @ moved, eye, shot.width, shot.height)
+
+    def render(part: Shot) -> None:
+        buffers.draw(rows, prefix, part, light)
+
+    return pictured(buffers.ctx, seen, render, 1, MSAA)
 
 
 def fragments(buffers: PlantBuffers, camera: Camera) -> int:

@@ -9,33 +9,13 @@ hexagonal grid (Lagae, Dutré: A comparison of methods for generating Poisson di
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import ceil
-
 import numpy as np
 
 from vegtool.arrays import FloatArray, checked
+from vegtool.surfel_set import Spacing
 
 PREFIX = 1000
 """Points of the prefix that is measured, p_m."""
-
-
-@dataclass(frozen=True)
-class Spacing:
-    """What prefix lengths follow from. length: points of the prefix measured, p_m, copies not
-    counted. radius_m: median of the distances from each to the nearest other, r_m; zero where there
-    is no other. total: points of the whole order."""
-
-    length: int
-    radius_m: float
-    total: int
-
-    def prefix(self, radius_m: float) -> int:
-        """p(r): points of the shortest prefix that discs of a radius, metres, cover a surface with;
-        from 1, or 0 where there are none, to all."""
-        if self.radius_m >= radius_m * (self.total / max(self.length, 1)) ** 0.5:
-            return self.total  # of radius 0 too, which nothing is divided by
-        return min(max(ceil(self.length * (self.radius_m / radius_m) ** 2), 1), self.total)
 
 
 def spacing(positions: FloatArray) -> Spacing:
