@@ -139,7 +139,10 @@ def convert_file(job: Job, task: Task, progress: Progress = silent) -> Outcome:
     extra |= {job.name + ending: data for ending, data in chain.beside.items()}
     progress("writing", 0.9)
     with TemporaryDirectory() if task.dry_run else nullcontext(task.folder) as folder:
-        paths = write_chain(chain, Path(folder), task.force, task.depth, extra, inputs, task.packed)
+        paths = write_chain(
+            chain, Path(folder), task.force, task.depth, extra, inputs, task.packed,
+            task.convert.quantized,
+        )  # fmt: skip
         files = {str(task.folder / p.name): p.stat().st_size for p in paths}
     progress("done", 1.0)
     rows = tuple(_row(chain, i) for i in range(len(chain.levels)))
@@ -228,6 +231,7 @@ def _row(chain: LodChain, index: int) -> dict[str, Any]:
         "level": index,
         "kind": level.kind,
         "billboards": 0 if level.billboards is None else len(level.billboards),
+        **({} if level.surfels is None else {"surfels": len(level.surfels)}),
         "triangles": level.triangles,
         "texels": written_texels(level),
         "switch_distance_m": float(f"{level.near_distance_m:.4g}"),

@@ -1,4 +1,4 @@
-"""What goes out: levels of detail, each a mesh, a cloud of billboards or both, and their chain.
+"""What goes out: levels of detail, each a mesh, billboards, both or surfels, and their chain.
 
 Field terms: a *billboard* is one textured rectangle fixed in the plant's space; a *cluster* is the
 set of faces that it shows; a *shape* is how many billboards show one cluster (1, 2 or 3 crossed).
@@ -16,8 +16,9 @@ import numpy as np
 
 from vegtool.arrays import ByteArray, FloatArray, IntArray, checked, unit
 from vegtool.plant import Plant
+from vegtool.surfel_set import SurfelSet
 
-Kind = Literal["mesh", "billboards", "hybrid"]
+Kind = Literal["mesh", "billboards", "hybrid", "surfels"]
 
 FADE_FRACTION = 0.15
 """Of its switch distance: beyond it the level before is still drawn, fading out or, for a viewer
@@ -200,7 +201,7 @@ class Measured:
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """One level of detail: a mesh (a Plant), billboards with their atlas, or both.
+    """One level of detail: a mesh (a Plant), billboards with their atlas, both, or surfels.
 
     kind: a hybrid level is billboards, of which there may be none, and an opaque mesh without
     textures of its own, coloured by its vertices or by the atlas (`charts`), which are drawn as one
@@ -227,11 +228,16 @@ class Level:
     unlit: bool = False
     seconds: dict[str, float] = field(default_factory=dict)
     charts: Charts | None = None
+    surfels: SurfelSet | None = None
 
     def __post_init__(self) -> None:
         if self.kind == "mesh" and self.mesh is None:
             raise ValueError("Level: a mesh level needs its mesh")
-        if self.kind != "mesh" and (self.billboards is None or self.atlas is None):
+        if self.kind == "surfels" and not self.surfels:
+            raise ValueError("Level: a level of surfels needs one at least")
+        if self.kind in ("billboards", "hybrid") and (
+            self.billboards is None or self.atlas is None
+        ):
             raise ValueError("Level: a billboard level needs billboards and an atlas")
         if self.kind == "hybrid":
             self._check_hybrid()
@@ -275,7 +281,8 @@ class Level:
         """Texels of all the level's textures (colour, normal and light counted each)."""
         if self.atlas is not None:
             return self.atlas.images * self.atlas.texels
-        assert self.mesh is not None
+        if self.mesh is None:
+            return 0
         textures = [
             (m.color_texture, m.normal_texture, m.light_texture) for m in self.mesh.materials
         ]

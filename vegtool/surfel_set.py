@@ -6,7 +6,7 @@ progressive blue surfels (2019), sections 3 and 4.1.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -83,6 +83,16 @@ class SurfelSet:
     def bounds(self) -> FloatArray:
         """(2, 3) metres: least and greatest coordinates of positions."""
         return np.stack([self.position.min(axis=0), self.position.max(axis=0)])
+
+    def first(self, count: int) -> SurfelSet:
+        """The set of a prefix, `count` surfels or all."""
+        return replace(
+            self,
+            position=self.position[:count],
+            normal=self.normal[:count],
+            color=self.color[:count],
+            spacing=replace(self.spacing, total=min(count, len(self))),
+        )
 
     def factors(self, prefix: npt.ArrayLike) -> FloatArray:
         """(m,) factors of the radii of discs for prefixes (m,), each one or more."""

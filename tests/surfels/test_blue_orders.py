@@ -13,8 +13,8 @@ from scipy.spatial import cKDTree
 
 from vegtool.arrays import FloatArray, IntArray
 from vegtool.errors import UsageError
-from vegtool.surfels.blue.averaged import averaged
 from vegtool.surfel_set import Spacing
+from vegtool.surfels.blue.averaged import averaged
 from vegtool.surfels.blue.distances import nearest, relative, spacing
 from vegtool.surfels.blue.exact import exact_order
 from vegtool.surfels.blue.farthest import farthest_order

@@ -22,6 +22,7 @@ from vegtool.formats import png
 from vegtool.formats.atomic import FileSet
 from vegtool.formats.glb import ELEMENT_ARRAY_BUFFER, Document
 from vegtool.formats.gltf_material import TRANSMISSION, UNLIT
+from vegtool.formats.gltf_surfels import add_surfels
 from vegtool.formats.manifest import LevelFile, encode, manifest, screen_height_fraction
 from vegtool.formats.ramp import RAMP, on_ramp
 from vegtool.lod import Level, LodChain, level_triangles
@@ -69,19 +70,25 @@ def plant_document(
     return writer.document
 
 
-def level_glb(level: Level, name: str, images: EncodedImages | None = None) -> bytes:
+def level_glb(
+    level: Level, name: str, images: EncodedImages | None = None, quantized: bool = False
+) -> bytes:
     """One level as a .glb file whose node is called `name`.
 
     Billboards are one mesh with one primitive and one material, alpha-tested; the mesh of a hybrid
-    level is in the same primitive, coloured by COLOR_0. `images` carries encoded images from one
-    call to the next for the same chain.
+    level is in the same primitive, coloured by COLOR_0. Surfels are points (gltf_surfels.py), in
+    fewer bits where `quantized`. `images` carries encoded images from one call to the next for the
+    same chain.
     """
-    writer = _Writer(_local_origin(_bounds(level)), {} if images is None else images)
+    origin = _local_origin(_bounds(level))
+    writer = _Writer(origin, {} if images is None else images, quantized=quantized)
     writer.document.show(writer.add_level(level, name))
     return writer.document.glb()
 
 
-def chain_glb(chain: LodChain, images: EncodedImages | None = None) -> bytes:
+def chain_glb(
+    chain: LodChain, images: EncodedImages | None = None, quantized: bool = False
+) -> bytes:
     """All levels as one .glb file, tied together by MSFT_lod.
 
     The scene holds the finest level alone, so a client that does not know the extension shows
@@ -90,7 +97,7 @@ def chain_glb(chain: LodChain, images: EncodedImages | None = None) -> bytes:
     """
     bounds = [_bounds(level) for level in chain.levels]
     origin = _local_origin(np.stack([np.min(bounds, (0, 1)), np.max(bounds, (0, 1))]))
-    writer = _Writer(origin, {} if images is None else images)
+    writer = _Writer(origin, {} if images is None else images, quantized=quantized)
     names = [level_name(chain, index) for index in range(len(chain.levels))]
     nodes = [writer.add_level(*pair) for pair in zip(chain.levels, names, strict=True)]
     if len(nodes) > 1:
@@ -113,6 +120,7 @@ def write_chain(
     extra: Mapping[str, bytes] | None = None,
     inputs: Iterable[Path] = (),
     packed: bool = False,
+    quantized: bool = False,
 ) -> list[Path]:
     """Write NAME_LOD1.glb, ..., NAME.glb (all levels), NAME_shadow.glb where the chain has one,
     NAME.lod.json and `extra`: all or none.
@@ -121,6 +129,7 @@ def write_chain(
     extra: bytes of further files by name, which appear with the others.
     inputs: files that the chain was made from; nothing in their folders is overwritten.
     packed: also NAME_LOD1_leaf.png, ..., of levels with Atlas.light: RGBA, as that.
+    quantized: surfels in fewer bits.
     Returns the paths of the files. Raises OutputError as FileSet does.
     """
     images: EncodedImages = {}
@@ -128,7 +137,7 @@ def write_chain(
         levels: list[LevelFile] = []
         for index, level in enumerate(chain.levels[1:], start=1):
             name = level_name(chain, index)
-            data = level_glb(level, name, images)
+            data = level_glb(level, name, images, quantized)
             files.add(f"{name}.glb", data)
             depth_name = leaf_name = None
             if depth and level.atlas is not None:
@@ -138,7 +147,7 @@ def write_chain(
                 leaf_name = f"{name}_leaf.png"
                 files.add(leaf_name, png.encode(level.atlas.light))
             levels.append(LevelFile(f"{name}.glb", len(data), depth_name, leaf_name))
-        data = chain_glb(chain, images)
+        data = chain_glb(chain, images, quantized)
         combined = LevelFile(f"{chain.name}.glb", len(data))
         files.add(combined.name, data)
         shadow = None
@@ -192,9 +201,11 @@ class _Writer:
     """Puts levels into one document, relative to one origin; each image goes in once."""
 
     def __init__(
-        self, origin: FloatArray, images: EncodedImages, beside: Mapping[int, str] | None = None
-    ) -> None:
+        self, origin: FloatArray, images: EncodedImages, beside: Mapping[int, str] | None = None,
+        *, quantized: bool = False,
+    ) -> None:  # fmt: skip
         self.document = Document()
+        self._quantized = quantized
         self._origin = origin
         self._images = images
         self._beside = beside or {}
@@ -206,6 +217,8 @@ class _Writer:
         if level.kind == "mesh":
             assert level.mesh is not None
             return self.add_plant(level.mesh, name)
+        if level.surfels is not None:
+            return add_surfels(self.document, level.surfels, name, self._origin, self._quantized)
         return self.add_atlas_level(level, name)
 
     def add_plant(self, plant: Plant, name: str, branches: Branches | None = None) -> int:
@@ -405,6 +418,8 @@ def _bounds(level: Level) -> FloatArray:
     """(2, 3) metres: least and greatest corner of what the level draws."""
     if level.mesh is not None and level.kind == "mesh":
         return level.mesh.bounds
+    if level.surfels is not None:
+        return level.surfels.bounds
     positions = level_triangles(level).positions
     return np.stack([positions.min(axis=0), positions.max(axis=0)])
 

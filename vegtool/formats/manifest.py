@@ -17,6 +17,7 @@ import vegtool
 from vegtool.errors import InputError
 from vegtool.formats.ramp import written_texels
 from vegtool.lod import FADE_FRACTION, Level, LodChain, Measured, ShadowProxy, Spread
+from vegtool.surfel_set import SurfelSet
 
 VERSION = 1  # of the schema: one more when a reader of the last one would misread the file
 DECIMALS = 4  # of an error
@@ -91,6 +92,7 @@ def _level(chain: LodChain, level: Level, file: LevelFile) -> dict[str, Any]:
         "kind": level.kind,
         "triangles": level.triangles,
         "billboards": 0 if level.billboards is None else len(level.billboards),
+        **({} if level.surfels is None else {"surfels": _surfels(level.surfels)}),
         "texels": written_texels(level),
         "bytes": file.bytes,
         "switch_distance_m": distance,
@@ -103,6 +105,14 @@ def _level(chain: LodChain, level: Level, file: LevelFile) -> dict[str, Any]:
         **({"unlit": True} if level.unlit else {}),
         **({"depth": file.depth} if file.depth else {}),
         **({"leaf": file.leaf} if file.leaf else {}),
+    }
+
+
+def _surfels(surfels: SurfelSet) -> dict[str, Any]:
+    return {
+        "count": len(surfels),
+        "p_m": surfels.spacing.length,
+        "r_m": surfels.spacing.radius_m,
     }
 
 

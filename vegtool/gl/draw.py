@@ -89,16 +89,24 @@ def pictured(
     whole = np.empty((shot.height, shot.width, 4), np.float32)
     with framebuffer_kept(ctx):
         for x, y, part in tiles(ctx, shot, supersample):
-            size = supersample * part.width, supersample * part.height
-            drawn = drawing_target(ctx, size, samples)
-            begin(drawn, size)
-            render(part)
-            pixels = resolved(ctx, drawn, (part.width, part.height), supersample, samples)
+            pixels = drawn_part(ctx, part, render, supersample, samples)
             data = pixels.frame.read((0, 0, part.width, part.height), components=4, dtype="f4")
             found = np.frombuffer(data, np.float32).reshape(part.height, part.width, 4)
             whole[y : y + part.height, x : x + part.width] = found
         check(ctx)
     return whole
+
+
+def drawn_part(
+    ctx: moderngl.Context, part: Shot, render: Callable[[Shot], None], supersample: int,
+    samples: int,
+) -> Target:  # fmt: skip
+    """What is rendered of a picture that a target can hold; as of `draw_tile`."""
+    size = supersample * part.width, supersample * part.height
+    drawn = drawing_target(ctx, size, samples)
+    begin(drawn, size)
+    render(part)
+    return resolved(ctx, drawn, (part.width, part.height), supersample, samples)
 
 
 def draw_tile(
@@ -112,13 +120,12 @@ def draw_tile(
 ) -> Target:
     """Draw a picture that a target can hold; what is returned has it in its lower left corner,
     top row first. The caller keeps the framebuffer (`framebuffer_kept`)."""
-    ctx = buffers[0].ctx
-    size = supersample * shot.width, supersample * shot.height
-    drawn = drawing_target(ctx, size, samples)
-    begin(drawn, size)
-    for each in buffers:
-        render(each, shot, light, supersample, anisotropy, shadows)
-    return resolved(ctx, drawn, (shot.width, shot.height), supersample, samples)
+
+    def render_all(part: Shot) -> None:
+        for each in buffers:
+            render(each, part, light, supersample, anisotropy, shadows)
+
+    return drawn_part(buffers[0].ctx, shot, render_all, supersample, samples)
 
 
 def begin(drawn: Target, size: tuple[int, int]) -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from time import perf_counter
 
+import moderngl
 import numpy as np
 
 from vegtool.arrays import FloatArray
@@ -23,13 +25,21 @@ def time_frames(
 
     samples: of multisampling. Raises CapabilityError as `draw` does.
     """
-    ctx = buffers.ctx
+    return time_rendered(
+        buffers.ctx, shot, lambda part: draw_tile((buffers,), part, light, 1, samples), repeats
+    )
+
+
+def time_rendered(
+    ctx: moderngl.Context, shot: Shot, render: Callable[[Shot], object], repeats: int
+) -> FloatArray:
+    """The same of anything that is rendered of a shot, part by part."""
     seconds = np.empty(WARM_UP + repeats)
     with framebuffer_kept(ctx):
         for i in range(len(seconds)):
             since = perf_counter()
             for _, _, part in tiles(ctx, shot, 1):
-                draw_tile((buffers,), part, light, 1, samples)
+                render(part)
             ctx.finish()
             seconds[i] = perf_counter() - since
         check(ctx)

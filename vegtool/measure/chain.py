@@ -19,7 +19,7 @@ from vegtool.lod import Display, Level, Measured
 from vegtool.measure.bounds import distance_for_pixels
 from vegtool.measure.distances import LeftOut, limits, rounded_up, switch_distances
 from vegtool.measure.options import MeasureOptions
-from vegtool.measure.pictures import client_plant
+from vegtool.measure.pictures import Uploaded, uploaded
 from vegtool.measure.scores import LADDER, Scores, TruthsAt, outside, scores
 from vegtool.measure.views import CLOSEST, View, views
 from vegtool.plant import Plant
@@ -108,12 +108,12 @@ class _Measuring:
         truth_at: TruthsAt | None,
     ) -> None:
         self.plant, self.levels, self.options, self.display = plant, levels, options, display
-        meshes = [plant, *(client_plant(level) for level in levels)]
         if truth_at is None:
             sharp = stack.enter_context(PlantBuffers(plant))
             truth_at = TruthsAt(plant, views_of(options), display, sharp)
         self._truth_at = truth_at
-        self._drawn = [stack.enter_context(PlantBuffers(mesh, mipmaps=True)) for mesh in meshes]
+        shown = [Level("mesh", mesh=plant), *levels]
+        self._drawn: list[Uploaded] = [stack.enter_context(uploaded(one)) for one in shown]
         self._known: dict[tuple[float, int], Scores] = {}
 
     def distances(self) -> FloatArray:

@@ -18,7 +18,7 @@ from vegtool.gl.upload import PlantBuffers
 from vegtool.lighting.light import Light, Sun
 from vegtool.lod import Level, LodChain
 from vegtool.measure.background import bytes_over
-from vegtool.measure.pictures import client_plant, live, truth
+from vegtool.measure.pictures import live, truth, uploaded
 from vegtool.measure.views import direction, framed
 
 CELL = 360
@@ -42,7 +42,7 @@ def contact_sheet(chain: LodChain) -> bytes:
         cells = []
         for level in levels:
             camera = framed(plant.center, plant.radius, VIEW, level.near_distance_m, chain.display)
-            with PlantBuffers(client_plant(level), mipmaps=True) as buffers:
+            with uploaded(level) as buffers:
                 above = truth(original, camera, light, 4, shadows)
                 cells.append(_cropped(above, live(buffers, camera, light)))
     width = MARGIN + len(levels) * (CELL + MARGIN)
@@ -100,6 +100,8 @@ def _caption(level: Level, number: int) -> list[tuple[str, tuple[int, int, int]]
         if level.mesh_triangles:
             shown += f" ({level.mesh_triangles:,} of a mesh)"
         atlas = f"atlas {width} x {height}"
+    if level.surfels is not None:
+        shown = f"{len(level.surfels):,} surfels"
     lines = [
         (f"LOD{number}, from {level.near_distance_m:g} m", INK),
         (shown, FAINT),

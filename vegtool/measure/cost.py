@@ -12,7 +12,7 @@ import numpy as np
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lighting.light import Light
 from vegtool.lod import Level
-from vegtool.measure.pictures import client_plant, fragments, frame_seconds, renderer
+from vegtool.measure.pictures import fragments, frame_seconds, renderer, uploaded
 from vegtool.measure.views import Camera
 
 FRAMES = 30
@@ -65,12 +65,11 @@ def cost(
     covered: pixels that the truth covers in each. file_bytes, peak_mb: of its file and of making
     it, which the caller knows. Raises CapabilityError where nothing can draw.
     """
-    plant = client_plant(level)
-    with PlantBuffers(plant, mipmaps=True) as buffers:
+    with uploaded(level) as buffers:
         shaded = [fragments(buffers, camera) for camera in cameras]
         each = -(-FRAMES // len(cameras))
         times = [frame_seconds(buffers, camera, light, each) for camera in cameras]
-        draw_calls = len(buffers.groups)
+        draw_calls = len(buffers.groups) if isinstance(buffers, PlantBuffers) else 1
     shares = [n / pixels for n, pixels in zip(shaded, covered, strict=True) if pixels > 0]
     return Cost(
         triangles=level.triangles,

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from vegtool.arrays import FloatArray, Picture
 from vegtool.gl.context import context, describe
-from vegtool.gl.count import count_fragments
-from vegtool.gl.draw import ANISOTROPY, MSAA, Shot, draw, pictured
+from vegtool.gl.count import count_fragments, count_rendered
+from vegtool.gl.draw import ANISOTROPY, MSAA, Shot, draw, drawn_part, pictured
 from vegtool.gl.points import SurfelSetBuffers
 from vegtool.gl.sun import SunMaps
 from vegtool.gl.targets import drawing_target
-from vegtool.gl.timing import time_frames
+from vegtool.gl.timing import time_frames, time_rendered
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lighting.light import Light
 from vegtool.lod import Level, level_triangles
@@ -55,6 +57,18 @@ def client_plant(level: Level) -> Plant:
     )
 
 
+Uploaded = PlantBuffers | SurfelSetBuffers
+"""A level on the GPU, as a client draws it."""
+
+
+def uploaded(level: Level) -> Uploaded:
+    """A level as a client has it, textures with mipmaps; surfels as our own viewer draws them. A
+    context manager: leaving releases."""
+    if level.surfels is not None:
+        return SurfelSetBuffers(level.surfels)
+    return PlantBuffers(client_plant(level), mipmaps=True)
+
+
 def renderer() -> dict[str, str]:
     """What draws here: vendor, renderer, version, largest texture side, as words.
 
@@ -88,17 +102,19 @@ def truth(
 
 
 def live(
-    buffers: PlantBuffers,
+    buffers: Uploaded,
     camera: Camera,
     light: Light | None = None,
     anisotropy: int = ANISOTROPY,
     shadows: SunMaps | None = None,
 ) -> Picture:
     """What a client shows: mip-mapped textures, alpha tested once per pixel, 4x multisampling
-    resolved in linear light. buffers: with mipmaps. anisotropy: of textures; 1, trilinear
+    resolved in linear light. buffers: as `uploaded`. anisotropy: of textures; 1, trilinear
     filtering, is how three.js comes. shadows: what throws some. Raises CapabilityError where OpenGL
     cannot.
     """
+    if isinstance(buffers, SurfelSetBuffers):
+        return live_surfels(buffers, camera, light)
     shot, light = shot_of(camera), light or Light()
     return draw(buffers, shot, light, samples=MSAA, anisotropy=anisotropy, shadows=shadows)
 
@@ -108,34 +124,49 @@ def live_surfels(
 ) -> Picture:
     """What our own viewer shows of surfels: discs of a diameter, in pixels, where there are as many
     as that takes; 4x multisampling."""
-    shot, light, one = shot_of(camera), light or Light(), np.ones(1)
-    foot, eye = np.zeros((1, 3)), camera.eye
+    shot, render = _rendering(buffers, camera, light or Light(), size_px)
+    return pictured(buffers.ctx, shot, render, 1, MSAA)
+
+
+def _rendering(
+    buffers: SurfelSetBuffers, camera: Camera, light: Light, size_px: float = 1.0
+) -> tuple[Shot, Callable[[Shot], None]]:
+    """A camera as a shot whose target is the eye, and what draws surfels into parts of it."""
+    shot, one, eye, foot = shot_of(camera), np.ones(1), camera.eye, np.zeros((1, 3))
     pixel = buffers.pixels(eye, foot, 0 * one, one, camera.focal_px)
     prefix, radius = buffers.surfels.discs(size_px * pixel / 2)
     rows = buffers.instances(eye, foot, 0 * one, one, radius)
     moved = np.eye(4)
     moved[:3, 3] = eye - camera.target
-    seen = Shot(shot.view_projection @ moved, eye, shot.width, shot.height)
 
     def render(part: Shot) -> None:
         buffers.draw(rows, prefix, part, light)
 
-    return pictured(buffers.ctx, seen, render, 1, MSAA)
+    return Shot(shot.view_projection @ moved, eye, shot.width, shot.height), render
 
 
-def fragments(buffers: PlantBuffers, camera: Camera) -> int:
+def fragments(buffers: Uploaded, camera: Camera) -> int:
     """Fragments that a client shades where nothing hides anything: overdraw, alpha or not."""
+    if isinstance(buffers, SurfelSetBuffers):
+        return count_rendered(buffers.ctx, *_rendering(buffers, camera, Light()))
     return count_fragments(buffers, shot_of(camera))
 
 
 def frame_seconds(
-    buffers: PlantBuffers, camera: Camera, light: Light | None = None, repeats: int = 30
+    buffers: Uploaded, camera: Camera, light: Light | None = None, repeats: int = 30
 ) -> FloatArray:
     """(repeats,) seconds of frames as `live` draws them, finished one by one and not read back.
 
     Raises CapabilityError as `live` does.
     """
-    return time_frames(buffers, shot_of(camera), light or Light(), MSAA, repeats)
+    light = light or Light()
+    if isinstance(buffers, SurfelSetBuffers):
+        shot, render = _rendering(buffers, camera, light)
+        ctx = buffers.ctx
+        return time_rendered(
+            ctx, shot, lambda part: drawn_part(ctx, part, render, 1, MSAA), repeats
+        )
+    return time_frames(buffers, shot_of(camera), light, MSAA, repeats)
 
 
 def shot_of(camera: Camera) -> Shot:

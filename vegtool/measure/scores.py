@@ -23,7 +23,7 @@ from vegtool.gl.upload import PlantBuffers
 from vegtool.lighting.light import Light
 from vegtool.lod import Display, Level, Spread
 from vegtool.measure.metrics import METRICS, Reference, reference, score
-from vegtool.measure.pictures import client_plant, live, truth
+from vegtool.measure.pictures import Uploaded, live, truth, uploaded
 from vegtool.measure.views import CLOSEST, Camera, View, around, distance_of
 from vegtool.plant import Plant
 from vegtool.progress import Progress, silent
@@ -182,24 +182,24 @@ class TruthsAt:
 
 def scores(
     truths: Truths,
-    level: Level | PlantBuffers | Callable[[View], Level],
+    level: Level | Uploaded | Callable[[View], Level],
     progress: Progress = silent,
 ) -> Scores:
     """Draw a level live (measure/pictures.py) from every camera of the truths, and score it.
 
-    level: or its `client_plant` as buffers with mipmaps; or a function that gives the level for a
+    level: or the same `uploaded`; or a function that gives the level for a
     view, for those that depend on it.
     """
     shape = len(truths.pixels), len(truths.views)
-    uploaded: dict[Level, PlantBuffers] = {}
+    on_gpu: dict[Level, Uploaded] = {}
 
-    def buffers_for(view: View) -> PlantBuffers:
-        if isinstance(level, PlantBuffers):
+    def buffers_for(view: View) -> Uploaded:
+        if isinstance(level, Uploaded):
             return level
         shown = level if isinstance(level, Level) else level(view)
-        if shown not in uploaded:
-            uploaded[shown] = PlantBuffers(client_plant(shown), mipmaps=True)
-        return uploaded[shown]
+        if shown not in on_gpu:
+            on_gpu[shown] = uploaded(shown)
+        return on_gpu[shown]
 
     def draw(row: int, column: int) -> Picture:
         view = truths.views[column]
@@ -212,7 +212,7 @@ def scores(
     try:
         found = _drawn_and(scored, draw, shape, "measuring", progress)
     finally:
-        for buffers in uploaded.values():
+        for buffers in on_gpu.values():
             buffers.release()
     values = {name: np.array([f[name] for f in found]).reshape(shape) for name in METRICS}
     return Scores(truths.pixels, truths.distance_m, values)

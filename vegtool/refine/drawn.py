@@ -8,10 +8,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from vegtool.arrays import Picture
-from vegtool.gl.upload import PlantBuffers
 from vegtool.lighting.light import Light
 from vegtool.lod import Level
-from vegtool.measure.pictures import client_plant, live
+from vegtool.measure.pictures import live, uploaded
 from vegtool.measure.views import Camera
 
 
@@ -22,7 +21,7 @@ def drawn(level: Level, cameras: Sequence[Camera], lights: Sequence[Light]) -> t
     Raises ValueError for another number of lights than of cameras, and CapabilityError where
     OpenGL cannot draw.
     """
-    with PlantBuffers(client_plant(level), mipmaps=True) as buffers:
+    with uploaded(level) as buffers:
         return tuple(
             live(buffers, camera, light, anisotropy=1)
             for camera, light in zip(cameras, lights, strict=True)

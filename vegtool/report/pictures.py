@@ -18,7 +18,7 @@ from vegtool.lighting.light import Light
 from vegtool.lod import Display, Level
 from vegtool.measure.background import bytes_over, over
 from vegtool.measure.flip import difference, perceived
-from vegtool.measure.pictures import client_plant, live, truth
+from vegtool.measure.pictures import live, truth, uploaded
 from vegtool.measure.views import CLOSEST, Camera, View, around, direction, distance_of
 from vegtool.report.entries import Entry, Shown
 from vegtool.report.rows import Pictures
@@ -71,7 +71,7 @@ def of_shown(shown: Shown, scene: Scene, sizes: Sequence[int]) -> Pictures:
     """What is shown, and its difference from the truth by FLIP, as PNGs by size."""
     level = shown if isinstance(shown, Level) else shown(VIEW)
     found = {}
-    with PlantBuffers(client_plant(level), mipmaps=True) as buffers:
+    with uploaded(level) as buffers:
         for size in (s for s in sizes if s in scene.cameras):
             picture = live(buffers, scene.cameras[size], Light(direction=VIEW.sun))
             error = difference(*(perceived(over(p)) for p in (scene.truths[size], picture)))

@@ -1,0 +1,182 @@
+"""The pipeline for one plant: Plant and options in, a chain of levels out.
+
+Every level is made for half the size on the screen of the one before, with half of its triangles,
+and its atlas, where it has one, holds one texel per pixel at that size. What makes it is
+refine/level.py or, with --refine none, the method of Colditz et al. 2005, section 2: clusters of
+the plant's faces, a box around each, one to three billboards per box, textures baked from the
+faces. From where it may be used is measured then (measure/chain.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import asdict, replace
+
+from vegtool.convert.makers import level_maker, most_billboards
+from vegtool.convert.options import (
+    MAKING,
+    MOST_OF_PREVIOUS,
+    NEAR_LIMITS,
+    PREPARING,
+    SURFEL_BILLBOARDS,
+    SURFELS,
+    TRIANGLES_PER_BILLBOARD,
+    ConvertOptions,
+)
+from vegtool.lighting.crown import crown_normals
+from vegtool.lighting.leaves import translucent
+from vegtool.lighting.light import Sun
+from vegtool.lod import Level, LodChain
+from vegtool.measure.distances import rounded_up
+from vegtool.measure.options import MeasureOptions
+from vegtool.measure.views import distance_of
+from vegtool.options import check_limits
+from vegtool.plant import Plant
+from vegtool.progress import Progress, silent
+from vegtool.surfels.options import SUFFIX
+
+
+def convert(
+    plant: Plant,
+    options: ConvertOptions | None = None,
+    measure: MeasureOptions | None = None,
+    progress: Progress = silent,
+) -> LodChain:
+    """Make the chain of levels of one plant.
+
+    levels[0] is the plant itself. Of the others there is one at least, and no more than save
+    triangles and may be used somewhere; `notes` name those that are of no use, and those that are
+    used farther than their coverage keeps. Raises UsageError for options out of range, QualityError
+    where no level keeps to `measure.max_error`, CapabilityError where nothing can draw.
+    """
+    from vegtool.baking.bake import PlantBuffers
+    from vegtool.gl.sun import SunMaps
+    from vegtool.measure.chain import views_of, with_distances
+    from vegtool.measure.scores import Shadowed, TruthsAt
+
+    options, measure = options or ConvertOptions(), measure or MeasureOptions()
+    check_limits(options)
+    check_limits(measure)
+    sun = options.baked_sun
+    plant = as_lit(plant, options)
+    making = 1.0 if measure.measure == "off" else MAKING
+    levels = [Level("mesh", mesh=plant, geometric_error_m=(0.0, 0.0))]
+    with ExitStack() as stack:
+        buffers = stack.enter_context(PlantBuffers(plant))
+        under = None
+        if sun is not None:
+            maps = stack.enter_context(SunMaps([buffers], sun.direction))
+            under = Shadowed(sun.light, maps)
+        truth_at = TruthsAt(plant, views_of(measure), options.display, buffers, under)
+        baked_from = buffers
+        if options.crown_normals:
+            crowned = crown_normals(plant, options.crown_normals)
+            baked_from = stack.enter_context(PlantBuffers(crowned))
+        prepared = options.method in (SURFELS, SURFEL_BILLBOARDS)
+        before = PREPARING * making if prepared else 0.0
+        make = level_maker(
+            baked_from, truth_at, options, progress=lambda s, f: progress(s, before * f)
+        )
+        farthest = rounded_up(distance_of(plant, options.display, NEAR_LIMITS[0]))
+        wanted = make.wanted(plant, farthest)
+        for index, (count, near) in enumerate(wanted):
+
+            def report(stage: str, fraction: float, index: int = index) -> None:
+                done = before + (making - before) * (index + fraction) / len(wanted)
+                progress(f"LOD{index + 1}: {stage}", done)
+
+            level = replace(make(count, min(near, farthest), report), near_distance_m=near)
+            saves = level.triangles <= MOST_OF_PREVIOUS * levels[-1].triangles
+            if saves or (index == len(wanted) - 1 and len(levels) == 1):
+                levels.append(level)
+        shadow = None
+        if options.shadow_proxy is not None:
+            from vegtool.refine.shadow_proxy import shadow_proxy
+
+            most = min(options.shadow_proxy // TRIANGLES_PER_BILLBOARD, most_billboards(plant))
+            shadow = shadow_proxy(
+                plant,
+                options.display,
+                lambda casting, seen, near_m: level_maker(casting, seen, options, casts=True)(
+                    most, near_m, lambda stage, _: progress(stage, making)
+                ),
+                wanted[0][1],
+            )
+        kept, notes = with_distances(
+            plant,
+            levels[1:],
+            measure,
+            options.display,
+            lambda stage, fraction: progress(stage, making + (1 - making) * fraction),
+            truth_at,
+        )
+        if options.refine != "none" and options.method != SURFELS:
+            from vegtool.refine.reach import coverage_notes
+
+            notes = (*notes, *coverage_notes(kept, truth_at))
+    notes = (*notes, *light_notes(plant, sun))
+    misses, beside = (*budget_notes(kept, options), *make.misses), make.beside()
+    if beside and (sun is not None or plant.exposure is not None):
+        for ending in beside:
+            notes = (*notes, f"light that is baked is in the levels, not in {plant.name}{ending}")
+    progress("levels", 1.0)
+    told = {**asdict(options), **asdict(measure)}
+    baked = {} if sun is None else sun.as_dict()
+    return LodChain(
+        plant.name,
+        (levels[0], *kept),
+        options.display,
+        options.seed,
+        told,
+        notes,
+        baked,
+        shadow,
+        misses,
+        beside,
+    )
+
+
+def endings(options: ConvertOptions) -> tuple[str, ...]:
+    """Of the names of files that are made beside the levels (LodChain.beside)."""
+    if options.method == SURFELS:
+        from vegtool.formats.ply_surfels import SUFFIX as PLY
+
+        return (PLY,)
+    return (SUFFIX,) if options.method == SURFEL_BILLBOARDS else ()
+
+
+def budget_notes(levels: Sequence[Level], options: ConvertOptions) -> tuple[str, ...]:
+    """Sentences on hybrids of more triangles than were allowed."""
+    if options.triangles is None:
+        return ()
+    over = [
+        f"LOD{number}: no hybrid was found of {options.triangles:,} triangles or fewer; it has "
+        f"{level.triangles:,}"
+        for number, level in enumerate(levels, start=1)
+        if level.triangles > options.triangles
+    ]
+    return tuple(over)
+
+
+def light_notes(plant: Plant, sun: Sun | None) -> tuple[str, ...]:
+    """Sentences on light that is not what it may seem."""
+    notes = []
+    if sun is not None and sun.elevation_deg < 0:
+        notes.append("the sun is below the horizon: the levels' colours have the sky's light alone")
+    unlit = [material.name for material in plant.materials if material.unlit]
+    if 0 < len(unlit) < len(plant.materials):
+        notes.append(f"unlit beside others that are lit: levels light it too: {', '.join(unlit)}")
+    return tuple(notes)
+
+
+def as_lit(plant: Plant, options: ConvertOptions) -> Plant:
+    """The plant with what the options say of light: its exposure, and what leaves let through."""
+    if options.translucency is not None:
+        plant = translucent(plant, options.translucency)
+    strength = float(options.prelit) if options.occlusion is None else options.occlusion
+    if strength:
+        from vegtool.refine.occlusion import exposed
+
+        plant = exposed(plant, strength)
+    return plant
