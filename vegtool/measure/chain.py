@@ -113,7 +113,11 @@ class _Measuring:
             truth_at = TruthsAt(plant, views_of(options), display, sharp)
         self._truth_at = truth_at
         shown = [Level("mesh", mesh=plant), *levels]
-        self._drawn: list[Uploaded] = [stack.enter_context(uploaded(one)) for one in shown]
+        self._drawn: list[Uploaded] = []
+        for one in shown:
+            on_gpu = uploaded(one)
+            stack.callback(on_gpu.release)
+            self._drawn.append(on_gpu)
         self._known: dict[tuple[float, int], Scores] = {}
 
     def distances(self) -> FloatArray:
