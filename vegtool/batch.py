@@ -231,7 +231,7 @@ def _row(chain: LodChain, index: int) -> dict[str, Any]:
         "level": index,
         "kind": level.kind,
         "billboards": 0 if level.billboards is None else len(level.billboards),
-        **({} if level.surfels is None else {"surfels": len(level.surfels)}),
+        "surfels": 0 if level.surfels is None else len(level.surfels),
         "triangles": level.triangles,
         "texels": written_texels(level),
         "switch_distance_m": float(f"{level.near_distance_m:.4g}"),

@@ -32,7 +32,10 @@ def summary_text(outcomes: Sequence[Outcome], dry_run: bool) -> str:
 
 
 def _block(outcome: Outcome, dry_run: bool) -> str:
-    shown = [{k: v for k, v in row.items() if k != "seconds"} for row in outcome.levels]
+    hidden = (
+        {"seconds"} if any(row["surfels"] for row in outcome.levels) else {"seconds", "surfels"}
+    )
+    shown = [{k: v for k, v in row.items() if k not in hidden} for row in outcome.levels]
     rows = [[_cell(v) for v in row.values()] for row in shown]
     head = [name.replace("_", " ") for name in shown[0]]
     total = human_bytes(sum(outcome.files.values()))

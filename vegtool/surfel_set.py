@@ -94,6 +94,10 @@ class SurfelSet:
             spacing=replace(self.spacing, total=min(count, len(self))),
         )
 
+    def moved(self, shift: FloatArray) -> SurfelSet:
+        """The set elsewhere, by (3,) metres."""
+        return replace(self, position=self.position + shift)
+
     def factors(self, prefix: npt.ArrayLike) -> FloatArray:
         """(m,) factors of the radii of discs for prefixes (m,), each one or more."""
         step = np.log2(np.maximum(np.asarray(prefix, np.float64), 1.0))

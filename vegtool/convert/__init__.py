@@ -7,6 +7,7 @@ from vegtool.convert.options import (
     MOST_BILLBOARDS,
     MOST_OF_PREVIOUS,
     NEAR_LIMITS,
+    SURFELS,
     TRIANGLES_PER_BILLBOARD,
     ConvertOptions,
 )
@@ -16,6 +17,7 @@ __all__ = [
     "MOST_BILLBOARDS",
     "MOST_OF_PREVIOUS",
     "NEAR_LIMITS",
+    "SURFELS",
     "TRIANGLES_PER_BILLBOARD",
     "ConvertOptions",
     "as_lit",

@@ -25,10 +25,12 @@ from vegtool.gl.instances import (
     instance_program,
 )
 from vegtool.gl.pace import Pace
+from vegtool.gl.points import SurfelSetBuffers
 from vegtool.gl.program import program
 from vegtool.gl.upload import Textures, rewritten
 from vegtool.lighting.light import Light
 from vegtool.plant import Plant
+from vegtool.surfel_set import SurfelSet
 
 GROUND_VERTEX = ("in_position", "in_normal")
 GROUND_COLOR = (0.105, 0.125, 0.055)
@@ -51,22 +53,34 @@ class Batch:
 
 
 @dataclass(frozen=True, eq=False)
+class PointBatch:
+    """Surfels of one plant at many places. surfels: index that the landscape gave them. rows: (n,)
+    POINT_INSTANCE, relative to the eye. prefix: (n,) int32, how many are drawn at each."""
+
+    surfels: int
+    rows: np.ndarray
+    prefix: IntArray
+
+
+@dataclass(frozen=True, eq=False)
 class Frame:
     """What is drawn of a landscape from one eye. rows: (n,) INSTANCE, relative to the eye; batches
-    nearest first, which hides most at least cost."""
+    nearest first, which hides most at least cost. points: after those."""
 
     rows: np.ndarray
     batches: tuple[Batch, ...]
+    points: tuple[PointBatch, ...] = ()
 
 
 @dataclass(frozen=True)
 class Drawn:
-    """What a frame was made of, ground included: calls, triangles, and samples that passed the
-    depth test."""
+    """What a frame was made of, ground included: calls, triangles, samples that passed the depth
+    test, and surfels."""
 
     draws: int
     triangles: int
     samples: int
+    surfels: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +110,7 @@ class Landscape(OnGpu):
     ) -> None:
         self.ctx = ctx or context()
         self._plants: dict[int, InstancedPlant] = {}
+        self._surfels: list[SurfelSetBuffers] = []
         self._added = 0
         self.fading = "pixels" if pixels_fade else "texels"
         self._noise = _noise_texture(self.ctx, noise)
@@ -124,6 +139,15 @@ class Landscape(OnGpu):
         self._added += 1
         return self._added - 1
 
+    def add_surfels(self, surfels: SurfelSet) -> int:
+        """Upload a set of surfels; returns its index among sets."""
+        self._surfels.append(SurfelSetBuffers(surfels, ctx=self.ctx))
+        return len(self._surfels) - 1
+
+    def surfels(self, index: int) -> SurfelSetBuffers:
+        """A set that was added."""
+        return self._surfels[index]
+
     def remove(self, plant: int) -> None:
         """Free one of them; what it shares stays."""
         self._plants.pop(plant).release()
@@ -133,6 +157,9 @@ class Landscape(OnGpu):
         for plant in self._plants.values():
             plant.release()
         self._plants.clear()
+        for surfels in self._surfels:
+            surfels.release()
+        self._surfels.clear()
         self._noise.release()
         self._rows.release()
         if self._ground is not None:
@@ -152,10 +179,12 @@ class Landscape(OnGpu):
         *,
         wireframe: bool = False,
         ground: bool = True,
+        footprint: float = 1.0,
     ) -> Drawn:
         """Draw into the framebuffer in use, which is cleared and has depth.
 
-        shot: its target is the eye, relative to which the rows are.
+        shot: its target is the eye, relative to which the rows are. footprint: samples per pixel
+        and axis.
         """
         self._rows = rewritten(self._rows, frame.rows)
         if view == "overdraw":
@@ -164,13 +193,20 @@ class Landscape(OnGpu):
         self.ctx.wireframe = wireframe
         with self._samples:
             draws, triangles = self._draw_plants(frame, shot, light, view)
+            drawn = [
+                self._surfels[one.surfels].draw(
+                    one.rows, one.prefix, shot, light, view, footprint=footprint
+                )
+                for one in frame.points
+            ]
+            draws += len(drawn)
             if ground and self._ground is not None:  # last: most of it is hidden
                 self.ctx.disable(moderngl.CULL_FACE)
                 triangles += self._ground.draw(shot, light, view)
                 draws += 1
         self.ctx.wireframe = False
         self.ctx.enable_only(moderngl.DEPTH_TEST)
-        return Drawn(draws, triangles, self._samples.samples)
+        return Drawn(draws, triangles, self._samples.samples, sum(drawn))
 
     def _draw_plants(self, frame: Frame, shot: Shot, light: Light, view: View) -> tuple[int, int]:
         self._noise.use(NOISE)
@@ -211,7 +247,7 @@ def picture(
     """A frame as light and coverage, as `gl.draw.draw` gives them of one plant."""
 
     def render(part: Shot) -> None:
-        landscape.draw(frame, part, light, ground=ground)
+        landscape.draw(frame, part, light, ground=ground, footprint=supersample)
 
     return pictured(landscape.ctx, shot, render, supersample, samples)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 
-from vegtool.arrays import FloatArray, IntArray
+from vegtool.arrays import ByteArray, FloatArray, IntArray
 from vegtool.gl.context import OnGpu, context
 from vegtool.gl.draw import Shot, set_sky
 from vegtool.gl.instances import OVERDRAW_STEP, View
@@ -19,10 +19,13 @@ from vegtool.gl.upload import rewritten
 from vegtool.lighting.light import Light
 from vegtool.surfel_set import SurfelSet
 
-POINT_INSTANCE = np.dtype([("place", "f4", 4), ("turn_size", "f4", 3)])
+POINT_INSTANCE = np.dtype([("place", "f4", 4), ("turn_size", "f4", 4), ("tint", "u1", 4)])
 """place: metres from the eye to the points' center, and metres of a unit. turn_size: cosine and
-sine of the turn about y, radius of the discs in that unit."""
-PER_INSTANCE = (("in_place", "4f", 0), ("in_turn_size", "3f", 16))
+sine of the turn about y, radius of the discs in that unit, factor of the width. tint: 0 to 255 for
+linear factors of 0 to 2."""
+AS_IT_IS = (127, 127, 127, 255)
+"""A tint, nearly."""
+PER_INSTANCE = (("in_place", "4f", 0), ("in_turn_size", "4f", 16), ("in_tint", "4f1", 32))
 """Attributes: name, format and offset."""
 
 
@@ -52,22 +55,26 @@ class SurfelSetBuffers(OnGpu):
 
     def instances(
         self, eye: FloatArray, foot: FloatArray, turn: FloatArray, scale: FloatArray,
-        radius: FloatArray,
+        radius: FloatArray, width: FloatArray | None = None, tint: ByteArray | None = None,
     ) -> np.ndarray:  # fmt: skip
         """(n,) POINT_INSTANCE: surfels at so many places, as an eye (3,) sees them.
 
         foot: (n, 3) metres, of their origin. turn: (n,) radians about y. scale: (n,). radius: (n,)
-        metres of the discs, before scaling.
+        metres of the discs, before scaling. width: (n,) factors of what is not height, or None for
+        1. tint: (n, 4) as of POINT_INSTANCE, or None for what changes nothing.
         """
         cosine, sine = np.cos(turn), np.sin(turn)
+        wide = np.ones(len(foot)) if width is None else width
         x, y, z = self.center
+        x, z = wide * x, wide * z
         middle = np.stack(
             [cosine * x + sine * z, np.full(len(foot), y), cosine * z - sine * x], axis=1
         )
         rows = np.empty(len(foot), POINT_INSTANCE)
         rows["place"][:, :3] = foot - eye + scale[:, None] * middle
         rows["place"][:, 3] = scale * self.unit
-        rows["turn_size"] = np.stack([cosine, sine, radius / self.unit], axis=1)
+        rows["turn_size"] = np.stack([cosine, sine, radius / self.unit, wide], axis=1)
+        rows["tint"] = AS_IT_IS if tint is None else tint
         return rows
 
     def pixels(
@@ -85,7 +92,7 @@ class SurfelSetBuffers(OnGpu):
 
     def draw(
         self, rows: np.ndarray, prefix: IntArray, shot: Shot, light: Light, view: View = "lit",
-        paint: tuple[float, float, float] | None = None, footprint: float = 1.0,
+        footprint: float = 1.0,
     ) -> int:  # fmt: skip
         """Draw the first `prefix` (n,) surfels at each of n places into the framebuffer in use,
         which has depth; returns how many in all.
@@ -94,7 +101,7 @@ class SurfelSetBuffers(OnGpu):
         are alike to a power of two are one call, and have as many as the longest.
         """
         defines = {
-            "UNLIT": self.surfels.unlit, "PAINTED": paint is not None,
+            "UNLIT": self.surfels.unlit, "PAINTED": view == "painted",
             f"OVERDRAW {OVERDRAW_STEP}": view == "overdraw",
         }  # fmt: skip
         told = [name for name, wanted in defines.items() if wanted]
@@ -105,7 +112,6 @@ class SurfelSetBuffers(OnGpu):
             ("unprojection", tuple(np.linalg.inv(matrix).T.ravel())),
             ("size", (footprint * shot.width, footprint * shot.height)),
             ("focal", footprint * float(np.linalg.norm(matrix[0, :3])) * shot.width / 2),
-            ("paint", paint),
         ):
             if name in shader:
                 shader[name] = value
@@ -119,10 +125,13 @@ class SurfelSetBuffers(OnGpu):
         sent = 0
         for first, end in zip(starts, np.append(starts[1:], len(count)), strict=False):
             most = int(count[first])
-            array = self._array(shader, int(first))
-            array.render(moderngl.POINTS, vertices=most, instances=int(end - first))
-            self._pace.sent(most * int(end - first))
-            sent += most * int(end - first)
+            at_once = max(self._pace.most // most, 1)
+            for row in range(int(first), int(end), at_once):
+                part = min(at_once, int(end) - row)
+                array = self._array(shader, row)
+                array.render(moderngl.POINTS, vertices=most, instances=part)
+                self._pace.sent(most * part)
+                sent += most * part
         self.ctx.disable(moderngl.PROGRAM_POINT_SIZE)
         return sent
 

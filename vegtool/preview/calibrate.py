@@ -34,6 +34,7 @@ from vegtool.preview.choice import (
 from vegtool.preview.correction import SIDES, Correction, smoothed
 from vegtool.preview.eye import Eye
 from vegtool.preview.options import FadeMode
+from vegtool.preview.points import point_batches
 from vegtool.preview.stock import STOCK
 from vegtool.tiles.library import Species
 
@@ -124,8 +125,10 @@ def _drawn(landscape: Landscape, kinds: Kinds, view: View, factor: float, fade: 
     """What a plant covers whose lengths are changed by a factor."""
     only = Correction(np.zeros(1), np.full((1, SIDES), factor))
     tried = replace(kinds, corrections=(only,) * len(kinds.count))
-    what = chosen(view[2], tried, 1.0, fade)
-    return _covered(landscape, frame(view[2], what), view, 1, MSAA)
+    eye, size, seen = view
+    what = chosen(seen, tried, 1.0, fade)
+    points = point_batches(landscape, seen, what, eye.focal_px(size[1]))
+    return _covered(landscape, replace(frame(seen, what), points=points), view, 1, MSAA)
 
 
 def _wanted(

@@ -18,7 +18,7 @@ Tiles are culled first and plants second, both in arrays.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -73,7 +73,8 @@ class Kinds:
     fade: (s, l). model: (s, l) int32, index in the landscape. triangles: (s, l). count: (s,)
     levels. opaque: (s, l) bool, fades by elements; else by texels. center: (s,) metres above the
     foot, and radius: (s,), of what a plant fills. thinned_m: (s,), up to which all plants are
-    drawn. corrections: of each kind.
+    drawn. surfels: (s,) int32 the level that is surfels, -1 where there is none. corrections: of
+    each kind.
     """
 
     switch_m: FloatArray
@@ -86,6 +87,7 @@ class Kinds:
     center: FloatArray
     radius: FloatArray
     thinned_m: FloatArray
+    surfels: IntArray
     corrections: tuple[Correction, ...] = ()
 
 
@@ -97,13 +99,14 @@ def kinds_of(
 ) -> Kinds:
     """The species for pictures in which a metre at a distance of one is `focal_px` pixels.
 
-    elements, model: of each level of each species.
+    elements, model: of each level of each species; model of its surfels, too, if it has some.
     """
-    most = max(len(one.levels) for one in species)
+    most = max(len(one.levels) + (one.surfels is not None) for one in species)
     shape = (len(species), most)
     switch, room, fade = np.full(shape, np.inf), np.full(shape, np.inf), np.zeros(shape)
     index, opaque, triangles = np.zeros(shape, np.int32), np.zeros(shape, bool), np.ones(shape)
-    count = np.array([len(one.levels) for one in species], np.int32)
+    count = np.array([len(one) for one in model], np.int32)
+    surfels = np.full(len(species), -1, np.int32)
     center, radius, thinned = (np.zeros(len(species)) for _ in range(3))
     for i, one in enumerate(species):
         n, plant = len(one.levels), one.levels[0]
@@ -114,17 +117,22 @@ def kinds_of(
         textured = np.array([any(m.textures for m in level.materials) for level in one.levels])
         room[i, 1:n] *= np.where(textured[: n - 1] & ~textured[1:], TEXTURED, 1.0)
         fade[i, :n] = one.fade
-        index[i, :n] = model[i]
+        index[i, : len(model[i])] = model[i]
         opaque[i, :n] = [
             all(m.alpha_mode == "opaque" for m in level.materials) for level in one.levels
         ]
+        if one.surfels is not None:
+            surfels[i], triangles[i, n] = n, triangles[i, 0]
+            # discs of twice the size are for half the distance
+            room[i, n] = switch[i, n] = one.surfels.switch_m * focal_px / one.focal_px
+            fade[i, n], opaque[i, n] = one.surfels.fade, True
         low, high = plant.bounds
         center[i] = (low[1] + high[1]) / 2
         side = np.abs(np.stack([low, high])).max(axis=0)
         radius[i] = float(np.hypot(np.hypot(side[0], side[2]), (high[1] - low[1]) / 2))
         thinned[i] = reach / THINNED_PX
     return Kinds(
-        switch, room, fade, index, triangles, count, opaque, center, radius, thinned
+        switch, room, fade, index, triangles, count, opaque, center, radius, thinned, surfels
     )  # fmt: skip
 
 
@@ -257,7 +265,8 @@ class Chosen:
     of: (m,) which of the plants, all of them first. level: (m,) of its species. model: (m,) in the
     landscape. kept: (m,) share of its elements.
     length: (m,) of those that are enlarged. shown: (m,) as `reveal.glsl` reads it. solid: (m,)
-    share of what has no texels that is shown where texels fade. fading: (m,) bool.
+    share of what has no texels that is shown where texels fade. fading: (m,) bool. points: (m,)
+    bool, whether the level is surfels: their discs are as much larger as `length` says.
     """
 
     of: np.ndarray
@@ -268,6 +277,12 @@ class Chosen:
     shown: np.ndarray
     solid: np.ndarray
     fading: np.ndarray
+    points: np.ndarray
+
+    def only(self, which: np.ndarray) -> Chosen:
+        """Those of a mask (m,), or of indices."""
+        values = (getattr(self, item.name)[which] for item in fields(self))
+        return Chosen(*values)
 
 
 def chosen(
@@ -302,7 +317,10 @@ def chosen(
     drawn = np.concatenate([level, at.before[kind[fades], level[fades]]])
     comes = np.concatenate([share, share[fades]])
     leaves = np.arange(len(of)) >= len(each)
-    whole = np.ones(len(of)) if held is not None else _share_whole(at, kind[of], drawn, away[of])
+    points = kinds.surfels[kind[of]] == drawn
+    whole = np.ones(len(of))
+    if held is None:  # of surfels, a prefix is drawn anyway
+        whole = np.where(points, 1.0, _share_whole(at, kind[of], drawn, away[of]))
     kept, enlarged = whole * WHOLE, whole**-GROWTH
     if held is None:
         side = sides_of(found.place, found.rows["turn"])
@@ -320,7 +338,7 @@ def chosen(
         shown = np.where(fading, threshold_of(visible), shown)
         solid = np.where(fading, visible, solid)
     model = kinds.model[kind[of], drawn]
-    return Chosen(of, drawn.astype(np.uint8), model, kept, enlarged, shown, solid, fading)
+    return Chosen(of, drawn.astype(np.uint8), model, kept, enlarged, shown, solid, fading, points)
 
 
 def _share_whole(at: Switches, kind: np.ndarray, level: np.ndarray, away: np.ndarray) -> np.ndarray:
@@ -341,8 +359,11 @@ def _lengths(kinds: Kinds, kind: np.ndarray, stage: np.ndarray, side: np.ndarray
 
 
 def frame(found: Seen, what: Chosen, paint: np.ndarray | None = None) -> Frame:
-    """The rows and batches of what was chosen, nearest first. paint: (m, 4) uint8 in place of the
-    plants' own tints."""
+    """The rows and batches of what was chosen that is triangles, nearest first. paint: (m, 4) uint8
+    in place of the plants' own tints."""
+    if what.points.any():
+        paint = None if paint is None else paint[~what.points]
+        what = what.only(~what.points)
     rows = np.zeros(len(what.of), INSTANCE)
     stock = found.rows[what.of]
     rows["place"][:, :3] = found.place[what.of]
@@ -350,7 +371,7 @@ def frame(found: Seen, what: Chosen, paint: np.ndarray | None = None) -> Frame:
     rows["turn"][:, :2] = stock["turn"]
     rows["turn"][:, 2], rows["turn"][:, 3] = what.kept, what.length
     rows["shown"][:, 0], rows["shown"][:, 2] = what.shown, what.solid
-    rows["shown"][:, 1] = _width(stock["vanish"], found.spare[what.of])
+    rows["shown"][:, 1] = width(stock["vanish"], found.spare[what.of])
     rows["tint"] = stock["tint"] if paint is None else paint
     steps = np.floor(-np.log(np.clip(what.kept, 1e-6, 1)) / np.log(SHARES)).astype(np.int64)
     key = (what.model * 64 + steps) * 2 + what.fading
@@ -372,7 +393,7 @@ def frame(found: Seen, what: Chosen, paint: np.ndarray | None = None) -> Frame:
     return Frame(rows, batches)
 
 
-def _width(vanish: np.ndarray, spare: np.ndarray) -> np.ndarray:
+def width(vanish: np.ndarray, spare: np.ndarray) -> np.ndarray:
     """(m,) factor of the width of plants, for those that are left out around them, and of those
     that are about to be. spare: as of Seen."""
     fewer = np.minimum((spare / vanish) ** 2, 1.0)  # the share of its kind that is still drawn

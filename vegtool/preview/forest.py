@@ -17,7 +17,7 @@ from vegtool.arrays import FloatArray, Picture
 from vegtool.elements import Elements, ordered
 from vegtool.gl.context import OnGpu
 from vegtool.gl.draw import MSAA
-from vegtool.gl.landscape import GroundMesh, Landscape, picture
+from vegtool.gl.landscape import Frame, GroundMesh, Landscape, picture
 from vegtool.gl.window_client import Context
 from vegtool.preview.calibrate import corrected
 from vegtool.preview.choice import (
@@ -34,6 +34,7 @@ from vegtool.preview.correction import NONE, Correction
 from vegtool.preview.eye import Eye
 from vegtool.preview.options import FadeMode
 from vegtool.preview.palette import PALETTE, Color
+from vegtool.preview.points import point_batches
 from vegtool.preview.reveal import noise
 from vegtool.preview.scenery import AS_IT_IS, VIEWS, FrameStats, Look
 from vegtool.preview.stock import Stock, stocked
@@ -93,6 +94,8 @@ class Forest(OnGpu):
                 self._models[-1].append(landscape.add(level, elements, mipmaps=not self.sharp))
                 done += 1
                 yield done / total
+            if one.surfels is not None:
+                self._models[-1].append(landscape.add_surfels(one.surfels.read()))
         if self.sharp:
             return
         plain = kinds_of(self.species, self._elements, self._models, CALIBRATED_PX)
@@ -124,7 +127,7 @@ class Forest(OnGpu):
             raise ValueError("Forest.draw: load it first")
         started = perf_counter()
         found, what, tiles = self.choose(eye, size, look)
-        drawn_frame = frame(found, what, self._paint(found, what, look.color))
+        drawn_frame = self._frame(found, what, eye.focal_px(size[1]), look)
         chosen_at = perf_counter()
         view = VIEWS.get(look.color, "painted")
         drawn = landscape.draw(
@@ -141,6 +144,7 @@ class Forest(OnGpu):
             drawn.samples // MSAA,
             look.detail,
             {"choose": chosen_at - started, "draw": ended - chosen_at},
+            (f"{drawn.surfels:,} surfels",) if drawn.surfels else (),
         )
 
     def picture(
@@ -156,7 +160,7 @@ class Forest(OnGpu):
         if landscape is None:
             raise ValueError("Forest.picture: load it first")
         found, what, _ = self.choose(eye, size, look)
-        drawn = frame(found, what, self._paint(found, what, look.color))
+        drawn = self._frame(found, what, eye.focal_px(size[1]), look)
         return picture(landscape, drawn, eye.shot(*size), look.light, supersample, samples)
 
     def choose(
@@ -181,6 +185,12 @@ class Forest(OnGpu):
         for levels, end in zip(kept, ends, strict=True):
             levels[:] = before[end - len(levels) : end]
         return found, what, tiles
+
+    def _frame(self, found: Seen, what: Chosen, focal_px: float, look: Look) -> Frame:
+        assert self._landscape is not None
+        paint = self._paint(found, what, look.color)
+        points = point_batches(self._landscape, found, what, focal_px, 1.0, paint)
+        return replace(frame(found, what, paint), points=points)
 
     def _paint(self, found: Seen, what: Chosen, color: Color) -> np.ndarray | None:
         if color in VIEWS:

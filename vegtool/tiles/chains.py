@@ -20,6 +20,7 @@ from vegtool.convert import (
     LEVEL_RATIO,
     MOST_OF_PREVIOUS,
     NEAR_LIMITS,
+    SURFELS,
     TRIANGLES_PER_BILLBOARD,
     ConvertOptions,
     convert,
@@ -138,12 +139,14 @@ def _converted(work: Work, progress: Progress) -> LodChain:
 def _following(source: Source, library: Path) -> Work | None:
     """How a converted plant gets coarser levels, where it lacks them."""
     base, told = stored_species(source.path), read_manifest(source.path)
-    last = told["levels"][-1]
+    last = told["levels"][len(base.levels) - 1]
     if last["triangles"] <= FEW:
         return None
     read, how, measure = _options(source.path, told)
     if len(base.levels) == 1:
         how = replace(how, levels=LEVELS)
+        if how.method == SURFELS:  # tiles are merged of triangles
+            how = ConvertOptions(levels=LEVELS, fov=how.fov, image_height=how.image_height)
     else:
         planes = max(1, last["triangles"] // (LEVEL_RATIO * TRIANGLES_PER_BILLBOARD))
         seen = Display(how.fov, how.image_height).pixels_per_metre(last["switch_distance_m"])
@@ -157,7 +160,7 @@ def _following(source: Source, library: Path) -> Work | None:
 def _coarser(work: Work, progress: Progress) -> LodChain:
     """The levels that follow those of a manifest, and its coarsest in place of the original."""
     base, told = stored_species(work.source.path), read_manifest(work.source.path)
-    last = told["levels"][-1]
+    last = told["levels"][len(base.levels) - 1]
     plant = read_plant(base.files[0], work.read)
     notes = list[str]()
     try:

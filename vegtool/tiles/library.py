@@ -14,10 +14,12 @@ from vegtool.arrays import FloatArray, IntArray, checked
 from vegtool.errors import InputError
 from vegtool.formats import READERS, ReadOptions, read_plant
 from vegtool.formats.beside import find_beside
+from vegtool.formats.gltf_surfels import read_surfel_set
 from vegtool.formats.manifest import read_manifest
 from vegtool.lod import FADE_FRACTION, Display
 from vegtool.plant import Plant
 from vegtool.progress import Progress, silent
+from vegtool.surfel_set import SurfelSet
 
 MANIFEST = ".lod.json"
 
@@ -46,6 +48,23 @@ class Stored(Sequence[Plant]):
         return moved(read_plant(self.files[index]), np.array(self.shift))
 
 
+@dataclass(frozen=True)
+class StoredSurfels:
+    """Surfels of which a plant is drawn from afar, read when they are asked for.
+
+    switch_m, fade: as of Species; any prefix is drawn beyond. shift: (x, y, z) metres.
+    """
+
+    file: Path
+    switch_m: float
+    fade: float
+    shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def read(self) -> SurfelSet:
+        """Raises InputError for a file that is missing or broken."""
+        return read_surfel_set(self.file).moved(np.array(self.shift))
+
+
 def moved(plant: Plant, shift: FloatArray) -> Plant:
     """A plant elsewhere, by (3,) metres; nobody needs its branches there."""
     if not shift.any():
@@ -57,7 +76,8 @@ def moved(plant: Plant, shift: FloatArray) -> Plant:
 class Species:
     """A plant and its levels, as files give them.
 
-    levels: the original, then coarser and coarser; a tuple, or Stored. switch_m: (n,) metres, from
+    levels: the original, then coarser and coarser; a tuple, or Stored: those that are triangles.
+    surfels: what follows them, or None. switch_m: (n,) metres, from
     where each may be used, 0 for the original, in pictures in which a metre at a distance of one is
     `focal_px` pixels. fade: (n,) share of that distance along which it replaces the one before.
     files: where each was read. error_m: (n,) metres, no more than which 95 % of each is from where
@@ -72,6 +92,7 @@ class Species:
     focal_px: float
     files: tuple[Path, ...]
     error_m: FloatArray = field(default_factory=lambda: np.empty(0))
+    surfels: StoredSurfels | None = None
 
     def __post_init__(self) -> None:
         count = len(self.levels)
@@ -84,6 +105,8 @@ class Species:
             object.__setattr__(self, name, value)
         if not count or self.switch_m[0] != 0 or (np.diff(self.switch_m) <= 0).any():
             raise ValueError("Species.switch_m: expected 0, then ascending distances")
+        if self.surfels is not None and self.surfels.switch_m <= self.switch_m[-1]:
+            raise ValueError("Species.surfels: expected a distance beyond that of all levels")
 
     @cached_property
     def _outline(self) -> tuple[FloatArray, IntArray]:
@@ -189,7 +212,15 @@ def stored_species(path: Path) -> Species:
     fade[0] = 0.0
     np.divide(ends - distances, distances, out=fade, where=distances > 0)
     focal = shown.pixels_per_metre(1.0)
-    stored = Stored(tuple(files))
     errors = [level["geometric_error_m"] for level in told["levels"]]
     error = np.array([np.nan if one is None else one["p95"] for one in errors], np.float64)
-    return Species(told["name"], stored, distances, fade, focal, stored.files, error)
+    points = [index for index, level in enumerate(told["levels"]) if level["kind"] == "surfels"]
+    surfels, count = None, len(files)
+    if points:  # those that follow are parts of the first, and levels of triangles come before
+        count = points[0]
+        surfels = StoredSurfels(files[count], float(distances[count]), float(fade[count]))
+    stored = Stored(tuple(files[:count]))
+    return Species(
+        told["name"], stored, distances[:count], fade[:count], focal, stored.files, error[:count],
+        surfels,
+    )  # fmt: skip

@@ -135,12 +135,13 @@ def placed(one: Species) -> tuple[Species, float]:
     if not shift.any():
         return one, 0.0
     levels: Sequence[Plant]
+    x, y, z = shift.tolist()
+    surfels = None if one.surfels is None else replace(one.surfels, shift=(x, y, z))
     if isinstance(one.levels, Stored):
-        x, y, z = shift.tolist()
         levels = replace(one.levels, shift=(x, y, z))
     else:
         levels = tuple(moved(level, shift) for level in one.levels)
-    return replace(one, levels=levels), float(np.linalg.norm(shift))
+    return replace(one, levels=levels, surfels=surfels), float(np.linalg.norm(shift))
 
 
 def shift_of(bounds: FloatArray) -> FloatArray:

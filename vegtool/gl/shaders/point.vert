@@ -6,13 +6,11 @@ in vec3 in_position;   // in the plant's frame and unit, from its center
 in vec3 in_normal;
 in vec3 in_color;      // linear
 in vec4 in_place;      // metres from the eye to the plant's center; metres of a unit
-in vec3 in_turn_size;  // cosine and sine of its turn about y; radius of the discs, in its unit
+in vec4 in_turn_size;  // cosine and sine of its turn about y; radius of the discs, in its unit; width
+in vec4 in_tint;       // 0 to 255
 
 uniform mat4 view_projection;
 uniform float focal;   // pixels of a metre at a distance of one
-#ifdef PAINTED
-uniform vec3 paint;
-#endif
 
 flat out vec3 center;
 flat out vec3 normal;
@@ -25,13 +23,14 @@ vec3 turned_about_y(vec3 v) {
 }
 
 void main() {
-    center = in_place.w * turned_about_y(in_position) + in_place.xyz;
+    vec3 local = vec3(in_turn_size.w, 1.0, in_turn_size.w) * in_position;
+    center = in_place.w * turned_about_y(local) + in_place.xyz;
     normal = turned_to(turned_about_y(in_normal), -center);
     radius = in_place.w * in_turn_size.z;
 #ifdef PAINTED
-    vec3 color = paint;
+    vec3 color = in_tint.rgb / 127.5;
 #else
-    vec3 color = in_color;
+    vec3 color = in_tint.rgb / 127.5 * in_color;
 #endif
 #ifdef UNLIT
     light = color;

@@ -1,0 +1,42 @@
+"""Surfels of a landscape from one eye: how many of each plant's, and how large their discs are.
+
+Brandt, Jähn, Fischer, Meyer auf der Heide: Rendering of complex heterogenous scenes using
+progressive blue surfels (2019), section 4.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vegtool.arrays import ByteArray
+from vegtool.gl.instances import WHOLE
+from vegtool.gl.landscape import Landscape, PointBatch
+from vegtool.preview.choice import Chosen, Seen, width
+
+
+def point_batches(
+    landscape: Landscape, found: Seen, what: Chosen, focal_px: float, size_px: float = 1.0,
+    paint: ByteArray | None = None,
+) -> tuple[PointBatch, ...]:  # fmt: skip
+    """What was chosen that is surfels.
+
+    focal_px: pixels of a metre at a distance of one. size_px: diameter of discs in pixels, where
+    there are as many surfels as that takes. paint: (m, 4) in place of the plants' own tints. Of
+    plants that fade, fewer are drawn; discs stay as they are.
+    """
+    batches = []
+    for index in np.unique(what.model[what.points]):
+        here = np.flatnonzero(what.points & (what.model == index))
+        surfels, stock = landscape.surfels(int(index)), found.rows[what.of[here]]
+        place, scale = found.place[what.of[here]].astype(np.float64), stock["scale"]
+        turn = np.arctan2(stock["turn"][:, 1], stock["turn"][:, 0])
+        pixel = surfels.pixels(np.zeros(3), place, turn, scale, focal_px)
+        prefix, radius = surfels.surfels.discs(size_px * pixel / 2)
+        share = np.minimum(what.kept[here] / WHOLE, 1.0)
+        rows = surfels.instances(
+            np.zeros(3), place, turn, scale, radius * what.length[here],
+            width(stock["vanish"], found.spare[what.of[here]]),
+            stock["tint"] if paint is None else paint[here],
+        )  # fmt: skip
+        batches.append(PointBatch(int(index), rows, np.ceil(share * prefix).astype(np.int32)))
+    return tuple(batches)
