@@ -50,5 +50,5 @@ def test_each_room_is_on_the_map() -> None:
     page = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     rooms = {path.name for path in (ROOT / "vegtool").iterdir() if path.suffix == ".py"}
     rooms |= {f"{path.parent.name}/" for path in ROOT.glob("vegtool/*/__init__.py")}
-    named = set(re.findall(r"`([a-z]+(?:\.py|/))`", page))
+    named = set(re.findall(r"`([a-z_]+(?:\.py|/))`", page))
     assert {room for room in rooms if not room.startswith("__")} - named == set()

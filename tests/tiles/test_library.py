@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 from library_cases import TRIANGLES, edit, model, write
 from plants import plant_of
+from surfel_sets import ball
 
 from vegtool.errors import InputError
 from vegtool.formats import ReadOptions, read_plant
-from vegtool.lod import FADE_FRACTION, Display
+from vegtool.formats.gltf import write_chain
+from vegtool.lod import FADE_FRACTION, Display, Level, LodChain
 from vegtool.tiles import library
 from vegtool.tiles.library import (
     MANIFEST,
@@ -23,6 +25,7 @@ from vegtool.tiles.library import (
     read_species,
     stored_species,
 )
+from vegtool.tiles.species import placed
 
 
 def test_a_manifest_gives_levels_and_where_they_take_over(tmp_path: Path) -> None:
@@ -173,3 +176,23 @@ def test_stored_levels_stand_where_they_are_moved(tmp_path: Path) -> None:
     there = Stored(oak.files, (1.0, -2.0, 3.0))[1:]
     away = there[0].positions - oak.levels[1].positions
     np.testing.assert_allclose(away, np.broadcast_to([1.0, -2.0, 3.0], away.shape), atol=1e-12)
+
+
+def test_surfels_follow_the_triangles(tmp_path: Path) -> None:
+    """The first level of them is all: the others are its parts. A plant that is moved to its place
+    takes them along."""
+    surfels = ball(60, 0.5, (3.0, 1.0, 0.0))
+    levels = [
+        Level("mesh", mesh=plant_of(TRIANGLES + np.array([20.0, 0, 0]))),
+        Level("surfels", surfels=surfels, near_distance_m=9.0),
+        Level("surfels", surfels=surfels.first(15), near_distance_m=18.0),
+    ]
+    write_chain(LodChain("oak", tuple(levels), Display(50.0, 900), 0), tmp_path)
+    one = read_species(tmp_path / f"oak{MANIFEST}")
+    assert len(one.levels) == 1 and one.switch_m.tolist() == [0]
+    assert one.surfels is not None and one.surfels.switch_m == 9.0
+    assert len(one.surfels.read()) == 60
+    moved, away = placed(one)
+    assert away > 19 and moved.surfels is not None
+    shift = moved.levels[0].bounds - one.levels[0].bounds
+    assert np.allclose(moved.surfels.read().position, one.surfels.read().position + shift[0])

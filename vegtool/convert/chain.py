@@ -34,7 +34,7 @@ from vegtool.measure.views import distance_of
 from vegtool.options import check_limits
 from vegtool.plant import Plant
 from vegtool.progress import Progress, silent
-from vegtool.surfels.options import SUFFIX
+from vegtool.surfels.options import POINTS_SUFFIX, SUFFIX
 
 
 def convert(
@@ -139,11 +139,7 @@ def convert(
 
 def endings(options: ConvertOptions) -> tuple[str, ...]:
     """Of the names of files that are made beside the levels (LodChain.beside)."""
-    if options.method == SURFELS:
-        from vegtool.formats.ply_surfels import SUFFIX as PLY
-
-        return (PLY,)
-    return (SUFFIX,) if options.method == SURFEL_BILLBOARDS else ()
+    return {SURFELS: (POINTS_SUFFIX,), SURFEL_BILLBOARDS: (SUFFIX,)}.get(options.method, ())
 
 
 def budget_notes(levels: Sequence[Level], options: ConvertOptions) -> tuple[str, ...]:

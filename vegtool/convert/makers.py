@@ -127,9 +127,10 @@ class Surfels(Maker):
         ]
 
     def beside(self) -> dict[str, bytes]:
-        from vegtool.formats.ply_surfels import SUFFIX, ply_bytes
+        from vegtool.surfels.blue.level import as_ply
+        from vegtool.surfels.options import POINTS_SUFFIX
 
-        return {SUFFIX: ply_bytes(self.made_from.surfels)}
+        return {POINTS_SUFFIX: as_ply(self.made_from)}
 
 
 def level_maker(

@@ -10,7 +10,6 @@ import numpy as np
 from vegtool.srgb import srgb_from_linear
 from vegtool.surfel_set import SurfelSet
 
-SUFFIX = ".ply"
 ROW = np.dtype(
     [(name, "<f4") for name in ("x", "y", "z", "nx", "ny", "nz")]
     + [(name, "u1") for name in ("red", "green", "blue")]

@@ -8,6 +8,8 @@ from vegtool.options import option
 
 SUFFIX = ".surfels"
 """Of files that hold a model (store.py)."""
+POINTS_SUFFIX = ".ply"
+"""Of files of surfels in progressive order (formats/ply_surfels.py)."""
 MEGABYTE = 1_000_000
 """Bytes."""
 

@@ -11,17 +11,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from vegtool.arrays import FloatArray
+from vegtool.formats.ply_surfels import ply_bytes
 from vegtool.gl.pictures import BakedLight
 from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Display, Level
 from vegtool.progress import Progress, silent
 from vegtool.surfel_set import SurfelSet
-from vegtool.surfels.blue.candidates import candidates
+from vegtool.surfels.blue.candidates import RESOLUTION, candidates
 from vegtool.surfels.blue.make import ordered
 from vegtool.timing import timed
 
 PLACES = 20_000
 """Of the surface, at which the error of a level is looked at."""
+PIXELS_OF_ROOT = 4.0
+"""Along the diagonal, for the root of the number of surfels: a closed surface then has some 25
+candidates for each."""
+COARSEST = 256
+"""Pixels along the diagonal, at least."""
 FAR = 0.95
 """Share of those places that are no farther from a surfel than is said."""
 
@@ -46,11 +52,21 @@ def sampled(
     colours. Raises CapabilityError where nothing can draw."""
     seconds: dict[str, float] = {}
     with timed(seconds, "candidates"):
-        found = candidates(buffers, progress=progress)
+        found = candidates(buffers, resolution_for(count), progress)
     with timed(seconds, "order"):
         surfels = ordered(found, count, seed=seed, unlit=lit is not None)
     step = max(len(found) // PLACES, 1)
     return Sampled(surfels, found.position[::step], seconds)
+
+
+def resolution_for(count: int) -> int:
+    """Pixels along the diagonal at which a plant is looked at for so many surfels."""
+    return int(np.clip(PIXELS_OF_ROOT * count**0.5, COARSEST, RESOLUTION))
+
+
+def as_ply(made: Sampled) -> bytes:
+    """All surfels as the bytes of a file."""
+    return ply_bytes(made.surfels)
 
 
 def nearest_m(surfels: SurfelSet, count: int, radius_m: float, display: Display) -> float:
