@@ -29,6 +29,7 @@ from vegtool.stability.case import Case, Outcome, exact, holds, relative
 from vegtool.stability.governor import TARGET_MS, Scene
 
 TOPIC = "size control"
+"""Heading of the cases in the table."""
 FRAMES = 1200
 """Of a run: 170 steps, more than there can be, each of as many frames as are waited for."""
 WITHIN = (DEAD_BAND[0] - 1e-9, DEAD_BAND[1] + 1e-9)
