@@ -20,8 +20,8 @@ is the circle that a lens shows."""
 FACTOR = (1.0, 2.0)
 """Of the size of surfels there. A picture for a headset is pressed together towards its border, by
 lenses such as the first Rift's (r + 0.22 r^3 + 0.24 r^5, r 1 at the border) to 2.04 pixels for one
-of its middle, 1.07 at a quarter; in between the straight line is within 5 % of it. So surfels look
-alike in all of what is seen, and none is larger than it would have to be."""
+of its middle, 1.07 at a quarter; in between, the straight line is within 7 % of it. So surfels are
+shown about alike, in the middle and at the border."""
 
 
 @dataclass(frozen=True)
