@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from cards import cards
 from stereo_cases import check_two_eyes
-from walk_cases import OPAQUE, Garden, herb, plants, species_of, tree, world_of
+from walk_cases import OPAQUE, Garden, bush, herb, plants, species_of, world_of
 
 from vegtool.preview.controls import Fly
 from vegtool.preview.drawn import show_of
@@ -44,7 +44,7 @@ def test_eyes_are_64_mm_apart_and_look_the_same_way() -> None:
 
 @pytest.mark.gl
 def test_each_half_is_what_its_eye_sees() -> None:
-    check_two_eyes(world_of((tree(), herb()), Garden([plants(FEET, [0, 0, 1])]), EYE))
+    check_two_eyes(world_of((bush(), herb()), Garden([plants(FEET, [0, 0, 1])]), EYE))
 
 
 def card_at(away_m: float, eye: Eye) -> World:

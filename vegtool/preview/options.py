@@ -26,8 +26,8 @@ class PreviewOptions:
 
     size: str = option("1024x768", "Width and height of the picture in pixels.", metavar="WxH")
     fps: float = option(
-        0.0, "Frames per second to hold, by coarser levels; 0: distances as stated.", least=0.0,
-        most=1000.0,
+        0.0, "Frames per second to hold, by coarser levels or larger surfels; 0: distances as "
+        "stated.", least=0.0, most=1000.0,
     )  # fmt: skip
     fade: str = option(
         "alpha-test", "How a level follows another: at once, by texels, by pixels.",
