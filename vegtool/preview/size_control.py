@@ -85,7 +85,7 @@ def step(state: SizeControl, frame_ms: float) -> SizeControl:
     """
     if not frame_ms >= 0:
         return state
-    if state.late:
+    if state.late > 0:
         return replace(state, late=state.late - 1)
     state = replace(state, recent_ms=(*state.recent_ms, frame_ms)[-MEDIAN_FRAMES:])
     if not state.resting:
