@@ -107,6 +107,18 @@ def test_a_picture_of_plants_in_a_row(here: Path, capsys: pytest.CaptureFixture[
     assert corner[2] > corner[1] > corner[0], "the sky is blue"
 
 
+def test_a_picture_a_film_and_figures_for_two_eyes(here: Path) -> None:
+    """Every frame of either has two halves that are nearly the same: of plants some metres away."""
+    written = ["--screenshot", "a.png", "--frames", "1", "--stats", "s.json", "-o", "walk.png"]
+    scene = ["--scene", "scene.toml", "--path", "way.toml", *written, "-q", *SIZE]
+    assert run(["preview", "out", "--stereo", *scene]) == 0
+    for name in ("a.png", "walk_0001.png", "walk_0005.png"):
+        picture = np.asarray(Image.open(name).convert("RGB")).astype(int)
+        left, right = picture[:, :60], picture[:, 60:]
+        assert 0 < np.abs(left - right).mean() < 0.5 * np.abs(left - right[:, ::-1]).mean()
+    assert len(json.loads(Path("s.json").read_text())["rows"]) == 1
+
+
 def test_the_same_picture_again_the_same_bytes(here: Path) -> None:
     for name in ("a.png", "b.png"):
         assert run(["preview", "out", "--scene", "scene.toml", "--screenshot", name, *SIZE]) == 0
@@ -213,6 +225,7 @@ MISTAKES = [
     (["out", "--html", "p.html", "--frames", "2"], 2, "--html: writes a page"),
     (["out", "--html", "p.html", "--scene", "scene.toml"], 2, "--html: writes a page"),
     (["out", "--html", "p.html", "--sun", "1,2"], 2, "--html: writes a page"),
+    (["out", "--html", "p.html", "--stereo"], 2, "--html: writes a page"),
     (["scene.toml", "--scene", "scene.toml"], 2, "got two scenes"),
     (["bush.glb", "--scene", "scene.toml"], 2, "bush.glb: expected a folder of converted plants"),
     (["out", "--unit", "cm", "--screenshot", "a.png"], 2, "out is converted already"),

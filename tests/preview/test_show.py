@@ -386,9 +386,10 @@ def test_a_window_shows_what_is_drawn_without_one(run) -> None:
 
 def shows_the_same() -> None:
     size = (150, 100)
-    for keys, threaded in (((), False), (("m",), True)):
+    for keys, stereo, threaded in (((), False, False), (("m",), False, True), ((), True, False)):
         alone, client = Walk(), Walk()
         for each in (alone, client):
+            each.state = replace(each.state, stereo=stereo)
             press(each, *keys)
         wanted = headless_picture(alone, size)
         assert len(np.unique(wanted.reshape(-1, 3), axis=0)) > 50

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from stereo_cases import check_two_eyes
 
 from vegtool.cli import run
 from vegtool.formats import ReadOptions
@@ -116,6 +117,10 @@ def test_colours_and_figures(file: Path) -> None:
     colored = np.unique(seen[1].reshape(-1, 3), axis=0).astype(int)
     reddest = (colored[:, 0] - colored[:, 2]).max()
     assert reddest > 80, "the finest billboards are red, as the level after the original"
+
+
+def test_each_half_of_a_stereo_picture_is_what_its_eye_sees(file: Path) -> None:
+    check_two_eyes(read_surfel_world(file, 80))
 
 
 def test_what_it_was_made_for_is_said(file: Path) -> None:

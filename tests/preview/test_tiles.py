@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xvfb
+from stereo_cases import check_two_eyes
 
 from vegtool.cli import run
 from vegtool.errors import InputError
@@ -492,6 +493,10 @@ def test_a_frame_of_two_views_reads_nothing_again(
             for look in (Look(level=2), Look(detail=IN_FULL, level=0)):
                 forest.picture(eye, SIZE, look)
     assert max(reads.values()) == 1 and len(reads) > 4
+
+
+def test_each_half_of_a_stereo_picture_is_what_its_eye_sees(made: Path) -> None:
+    check_two_eyes(read_tile_world(made / "tiles" / "tileset.json"))
 
 
 def test_species_have_colours_and_merged_tiles_are_white(made: Path) -> None:

@@ -27,6 +27,7 @@ from vegtool.preview.path import CameraPath, duration_s, eyes, recorded, written
 from vegtool.preview.run import frames, loaded, settle, summary, timed_frames
 from vegtool.preview.scenery import Place
 from vegtool.preview.show import SKY, Show
+from vegtool.preview.size_control import LARGEST_PX, SizeControl
 from vegtool.preview.state import FIRST_DETAIL, LEAST_DETAIL, State
 from vegtool.progress import Progress
 
@@ -46,11 +47,14 @@ def show_of(world: Place, options: PreviewOptions) -> Show:
     else:
         camera = Fly(world.start, ground=world.height_at)
     sun = world.sun if options.sun is None else Sun.read(options.sun)
-    governor = None
+    governor: Governor | SizeControl | None = None
     if options.fps:  # what is within BEGIN of the target is left as it is, and is to be fast enough
         target_ms = 1e3 / options.fps / (1 + BEGIN)
-        governor = Governor(target_ms, LEAST_DETAIL, detail=FIRST_DETAIL)
-    state = State(camera, world.target, sun=sun, governor=governor)
+        if world.progressive:
+            governor = SizeControl(target_ms, LARGEST_PX)
+        else:
+            governor = Governor(target_ms, LEAST_DETAIL, detail=FIRST_DETAIL)
+    state = State(camera, world.target, sun=sun, governor=governor, stereo=options.stereo)
     return Show(world, state, cast(FadeMode, options.fade))
 
 

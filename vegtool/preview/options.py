@@ -20,13 +20,14 @@ class PreviewOptions:
     """How a landscape is shown.
 
     size: pixels of the picture, "WIDTHxHEIGHT". fps: frames per second to be held by coming nearer
-    with all distances; 0 keeps the distances. fade: how levels follow each other.
+    with all distances; 0 keeps the distances. fade: how levels follow each other. stereo: a picture
+    for each eye, side by side.
     """
 
     size: str = option("1024x768", "Width and height of the picture in pixels.", metavar="WxH")
     fps: float = option(
-        0.0, "Frames per second to hold, by coarser levels; 0: distances as stated.", least=0.0,
-        most=1000.0,
+        0.0, "Frames per second to hold, by coarser levels or larger surfels; 0: distances as "
+        "stated.", least=0.0, most=1000.0,
     )  # fmt: skip
     fade: str = option(
         "alpha-test", "How a level follows another: at once, by texels, by pixels.",
@@ -35,6 +36,10 @@ class PreviewOptions:
     sun: str | None = option(
         None, "Where the sun stands: azimuth from +z towards +x and elevation, degrees.",
         metavar="AZ,EL",
+    )  # fmt: skip
+
+    stereo: bool = option(
+        False, "A picture for each eye, side by side, each of half the width.",
     )  # fmt: skip
 
     def __post_init__(self) -> None:

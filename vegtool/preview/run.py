@@ -15,6 +15,7 @@ from vegtool.gl.screen import Screen
 from vegtool.preview.eye import Eye
 from vegtool.preview.governor import LONGEST_STEP_S, MEDIAN_FRAMES, Governor
 from vegtool.preview.show import SKY, Show
+from vegtool.preview.size_control import SizeControl
 from vegtool.progress import Progress, silent
 
 SETTLING = 256
@@ -70,7 +71,9 @@ def settle(
         progress("finding what can be drawn in time", (index + 1) / SETTLING)
 
 
-def _settled(governor: Governor) -> bool:
+def _settled(governor: Governor | SizeControl) -> bool:
+    if isinstance(governor, SizeControl):
+        return governor.resting
     return not governor.correcting or governor.detail == governor.most
 
 

@@ -14,6 +14,7 @@ from vegtool.gl.landscape import GroundMesh
 from vegtool.gl.window_client import Context
 from vegtool.lighting.light import Light, Sun
 from vegtool.preview.eye import Eye
+from vegtool.preview.fovea import Fovea
 from vegtool.preview.options import FadeMode
 from vegtool.preview.palette import Color
 
@@ -26,13 +27,16 @@ IN_FULL = 1e9
 @dataclass(frozen=True, eq=False)
 class Look:
     """How a frame is drawn. detail: factor of all distances. level: held for all plants, or None.
-    color: what plants are coloured by."""
+    color: what plants are coloured by. surfel_px: diameter of surfels, pixels. fovea: where they
+    are larger, or None."""
 
     light: Light = field(default_factory=Light)
     detail: float = 1.0
     level: int | None = None
     color: Color = "as it is"
     wireframe: bool = False
+    surfel_px: float = 1.0
+    fovea: Fovea | None = None
 
 
 AS_IT_IS = Look()
@@ -101,6 +105,10 @@ class Place(Protocol):
     @property
     def orbited(self) -> bool:
         """Whether it is looked at from around at first, and not walked through."""
+
+    @property
+    def progressive(self) -> bool:
+        """Whether there are surfels in it, of which fewer and larger ones can be drawn."""
 
     def height_at(self, x: float, z: float) -> float:
         """Metres: of the ground."""

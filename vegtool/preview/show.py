@@ -13,10 +13,12 @@ from vegtool.gl.window_client import Context, Drag, Event, Framebuffer, Key, Scr
 from vegtool.measure.background import BACKGROUND
 from vegtool.preview.controls import Fly, Input, orbiting
 from vegtool.preview.eye import Eye
-from vegtool.preview.governor import BEGIN, step
+from vegtool.preview.fovea import Fovea
+from vegtool.preview.governor import BEGIN, Governor, step
 from vegtool.preview.options import FadeMode
 from vegtool.preview.palette import COLORS
 from vegtool.preview.scenery import IN_FULL, FrameStats, Look, Place
+from vegtool.preview.size_control import step as sized
 from vegtool.preview.state import State, help_text, moved, pressed
 
 MOVING = frozenset({"w", "a", "s", "d", "q", "e", "left", "right", "up", "down"})
@@ -25,6 +27,9 @@ FRAMES_TOLD = 30
 """Frames whose mean time is shown."""
 SKY = (float(BACKGROUND[0]), float(BACKGROUND[1]), float(BACKGROUND[2]))
 PANELS = ("by distance", "in full", "difference")
+EYES = ("left eye", "right eye")
+EYES_APART_M = 0.064
+"""Between two eyes: what most headsets begin with, a few millimetres from most people's."""
 
 
 class Keeper(Protocol):
@@ -73,18 +78,30 @@ class Show:
         """Move on by so many seconds, and draw."""
         self._move(seconds)
         state = self.state
-        look = Look(state.light, state.distances, state.level, state.color, state.wireframe)
+        look = Look(
+            state.light, state.distances, state.level, state.color, state.wireframe,
+            state.surfel_px, Fovea() if state.stereo else None,
+        )  # fmt: skip
         if state.compare:
-            self._compare(ctx, framebuffer, size, look)
+            look = replace(look, color=COLORS[0])  # what is false cannot be compared
+            full = replace(look, detail=IN_FULL, level=0, surfel_px=1.0)
+            drawn = [(state.eye, look), (state.eye, full)]
+            self.stats = self._side_by_side(ctx, framebuffer, size, max(size[0] // 3, 1), drawn)[0]
+        elif state.stereo:
+            drawn = [(eye, look) for eye in two_eyes(state.eye)]
+            both = self._side_by_side(ctx, framebuffer, size, (size[0] + 1) // 2, drawn)
+            self.stats = of_both(*both)
         else:
             framebuffer.clear(*_behind(look), 1.0)
             self.stats = self.forest.draw(state.eye, size, look)
         if self.stats is not None:
             took = sum(s for part, s in self.stats.seconds.items() if part != "load")
             self._times = [*self._times[1 - FRAMES_TOLD :], took]
-            if state.governor is not None:
+            if isinstance(state.governor, Governor):
                 governor = step(state.governor, 1e3 * took, seconds or None)
                 self.state = replace(self.state, governor=governor)
+            elif state.governor is not None:
+                self.state = replace(self.state, governor=sized(state.governor, 1e3 * took))
 
     def overlay(self) -> str:
         """Figures and help."""
@@ -118,8 +135,12 @@ class Show:
             lines.append(f"level {state.level} held")
         if state.color != COLORS[0]:
             lines.append(state.color)
+        if self.world.progressive:
+            lines.append(f"surfels of {state.surfel_px:.2f} pixels")
         if state.compare:
             lines.append(" | ".join(PANELS))
+        if state.stereo:
+            lines.append(" | ".join(EYES))
         if state.recording:
             lines.append(f"recording: {len(self.way)} frames")
         return "\n".join([*lines, "h: help"])
@@ -196,27 +217,45 @@ class Show:
         if self.state.recording:
             self.way.append((self.state.eye, self._clock))
 
-    def _compare(
-        self,
-        ctx: Context,
-        framebuffer: Framebuffer,
-        size: tuple[int, int],
-        look: Look,
-    ) -> None:
-        """Three pictures beside each other: as it is drawn, in full, and how they differ."""
+    def _side_by_side(
+        self, ctx: Context, framebuffer: Framebuffer, size: tuple[int, int], width: int,
+        drawn: Sequence[tuple[Eye, Look]],
+    ) -> list[FrameStats]:  # fmt: skip
+        """Two pictures of a width beside each other, and how they differ as far as there is room
+        for that; what each took."""
         if self._panels is None:
             self._panels = Panels(ctx)
-        part = (max(size[0] // 3, 1), size[1])
-        look = replace(look, color=COLORS[0])  # what is false cannot be compared
-        full = replace(look, detail=IN_FULL, level=0)
-        for index, one in enumerate((look, full)):
-            self._panels.begin(index, part, _behind(one))
-            drawn = self.forest.draw(self.state.eye, part, one)
-            if index == 0:
-                self.stats = drawn
+        found = []
+        for index, (eye, look) in enumerate(drawn):
+            self._panels.begin(index, (width, size[1]), _behind(look))
+            found.append(self.forest.draw(eye, (width, size[1]), look))
             self._panels.end(index)
         framebuffer.use()
         self._panels.show(size)
+        return found
+
+
+def two_eyes(middle: Eye) -> tuple[Eye, Eye]:
+    """The left and the right eye, which look along parallel axes."""
+    aside = EYES_APART_M / 2 * middle.axes[0]
+    left, right = middle.position - aside, middle.position + aside
+    return replace(middle, position=left), replace(middle, position=right)
+
+
+def of_both(left: FrameStats, right: FrameStats) -> FrameStats:
+    """What two eyes' pictures took together; plants and tiles as of the one that sees more."""
+    said = zip(EYES, (left.said, right.said), strict=True)
+    return replace(
+        left,
+        tiles=max(left.tiles, right.tiles),
+        plants=max(left.plants, right.plants),
+        rows=left.rows + right.rows,
+        draws=left.draws + right.draws,
+        triangles=left.triangles + right.triangles,
+        fragments=left.fragments + right.fragments,
+        seconds={part: s + right.seconds.get(part, 0.0) for part, s in left.seconds.items()},
+        said=tuple(f"{eye}: {line}" for eye, lines in said for line in lines),
+    )
 
 
 def _behind(look: Look) -> tuple[float, float, float]:

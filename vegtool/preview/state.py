@@ -17,6 +17,7 @@ from vegtool.preview.controls import Fly, Input, Orbit, fly, flying, orbit, orbi
 from vegtool.preview.eye import Eye
 from vegtool.preview.governor import Governor
 from vegtool.preview.palette import COLORS, Color
+from vegtool.preview.size_control import LARGEST_PX, SMALLEST_PX, SizeControl
 
 SUN_STEP_DEG = 5.0
 DETAIL_STEP = 1.1
@@ -29,8 +30,10 @@ FIRST_DETAIL = 1 / 48
 class State:
     """camera: what moves the eye. target: (3,) metres, what is orbited about. sun: None for the
     usual light. detail: factor of all distances, where no governor sets it. level: the level that
-    is held, or None. governor: what holds the frame time, or None. flight: how the eye flew before
-    it orbited.
+    is held, or None. governor: what holds the frame time, by distances or where there are surfels
+    by their size, or None. stereo: two pictures side by side, for two eyes; compare: three others.
+    flight: how the eye flew before it orbited.
+    Raises ValueError where it is both.
     """
 
     camera: Fly | Orbit
@@ -41,13 +44,18 @@ class State:
     color: Color = "as it is"
     wireframe: bool = False
     compare: bool = False
+    stereo: bool = False
     told: bool = True
     help: bool = False
     recording: bool = False
     screenshots: int = 0
     closing: bool = False
-    governor: Governor | None = None
+    governor: Governor | SizeControl | None = None
     flight: Fly | None = None
+
+    def __post_init__(self) -> None:
+        if self.compare and self.stereo:
+            raise ValueError("State: expected compare or stereo, each fills the window; got both")
 
     @property
     def eye(self) -> Eye:
@@ -63,6 +71,11 @@ class State:
     def distances(self) -> float:
         """The factor of all switch distances."""
         return self.detail if self.governor is None else self.governor.detail
+
+    @property
+    def surfel_px(self) -> float:
+        """Diameter of surfels, as large as the distances ask for."""
+        return min(max(1 / self.distances, SMALLEST_PX), LARGEST_PX)
 
 
 @dataclass(frozen=True)
@@ -128,6 +141,10 @@ def _next_color(state: State) -> State:
     return replace(state, color=COLORS[following])
 
 
+def _compare(state: State) -> State:
+    return state if state.stereo else replace(state, compare=not state.compare)
+
+
 def _hold(level: int | None) -> Callable[[State], State]:
     return lambda state: replace(state, level=level)
 
@@ -139,7 +156,7 @@ KEYS: tuple[Binding, ...] = (
     Binding("v", "v", "colour as it is, by level, by species, by overdraw",
             _next_color),
     Binding("x", "x", "wireframe", toggled("wireframe")),
-    Binding("m", "m", "compare with the plants in full, side by side", toggled("compare")),
+    Binding("m", "m", "compare with the plants in full, side by side", _compare),
     Binding("bracketleft", "[", "sun to the left", _sun_by(-SUN_STEP_DEG, 0.0)),
     Binding("bracketright", "]", "sun to the right", _sun_by(SUN_STEP_DEG, 0.0)),
     Binding("pageup", "Page Up", "sun higher", _sun_by(0.0, SUN_STEP_DEG)),

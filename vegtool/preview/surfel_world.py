@@ -41,6 +41,7 @@ class SurfelWorld:
     sun: Sun | None = None
     way: Path | None = None
     orbited: bool = True
+    progressive: bool = False
 
     def height_at(self, x: float, z: float) -> float:
         """Metres: of the ground, which is flat."""

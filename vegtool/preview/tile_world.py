@@ -37,6 +37,7 @@ class TileWorld:
     sun: Sun | None = None
     way: Path | None = None
     orbited: bool = False
+    progressive: bool = False
 
     def height_at(self, x: float, z: float) -> float:
         """Metres: of the feet on the smallest tile there."""

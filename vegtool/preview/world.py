@@ -76,6 +76,11 @@ class World:
         """Whether it is a row of plants."""
         return isinstance(self.placement, Row)
 
+    @property
+    def progressive(self) -> bool:
+        """Whether there are surfels among the levels."""
+        return False
+
     def scenery(self, fade: FadeMode) -> Scenery:
         """What draws it; nothing is uploaded yet."""
         return Forest(self.species, self.placement, self.ground, fade)

@@ -28,6 +28,7 @@ __all__ = ["CaseResult", "as_json", "cases", "markdown", "run"]
 TOPICS = (
     "clustering", "iterations", "boxes", "branches", "baking", "convert", "cameras", "distances",
     "colour", "coverage", "light", "light_shadows", "light_levels", "governor",
+    "size_control",
 )  # fmt: skip
 """Modules of this room, in the order of the table."""
 

@@ -35,6 +35,8 @@ more is known of a coordinate there.
 - A leaf does not shadow itself where the sun stands 0.3 degrees above it or more. Lower, it hides
   part of the sun's own disc, whose half is 0.265 degrees. A soft shadow is the mean of eight sharp
   ones, and within 0.21 of the share of the disc that is seen.
+- The size of surfels that holds a rate goes on moving where times leave 0.9 to 1.1 targets by
+  themselves, or jump across them at some size: by a quarter of what they are off.
 - Normals of a file that are of no length or no number are replaced and counted as it is read;
   `tests/formats/test_read_normals.py` has those cases, for nothing here opens files.
 """
