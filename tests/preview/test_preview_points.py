@@ -19,6 +19,7 @@ from vegtool.lod import Level
 from vegtool.preview.choice import Chosen, Seen
 from vegtool.preview.eye import Eye
 from vegtool.preview.forest import Forest
+from vegtool.preview.fovea import Fovea
 from vegtool.preview.palette import PALETTE
 from vegtool.preview.scenery import Look
 from vegtool.tiles.library import Species, StoredSurfels
@@ -26,6 +27,7 @@ from vegtool.tiles.library import Species, StoredSurfels
 pytestmark = pytest.mark.gl
 SIZE = (256, 256)
 FROM_M = 20.0
+EYE = Eye(np.array([0.0, 1.0, 0.0]), fov_y_deg=60.0)
 SURFELS = ball(2000, 1.0, (0, 1, 0), unlit=True)
 
 
@@ -49,13 +51,12 @@ def forest(species: Species) -> Iterator[Forest]:
 
 
 def chosen_at(forest: Forest, look: Look | None = None) -> tuple[Seen, Chosen]:
-    eye = Eye(np.array([0.0, 1.0, 0.0]), fov_y_deg=60.0)
-    found, what, _ = forest.choose(eye, SIZE, look or Look())
+    found, what, _ = forest.choose(EYE, SIZE, look or Look())
     return found, what
 
 
 def focal() -> float:
-    return Eye(np.zeros(3), fov_y_deg=60.0).focal_px(SIZE[1])
+    return EYE.focal_px(SIZE[1])
 
 
 def test_plants_are_surfels_from_their_distance_on(forest: Forest) -> None:
@@ -73,7 +74,7 @@ def test_plants_are_surfels_from_their_distance_on(forest: Forest) -> None:
 def test_a_prefix_is_a_quarter_at_twice_the_distance(forest: Forest) -> None:
     """As its discs' radius is twice as large, in metres: from what is nearest of the ball."""
     found, what = chosen_at(forest)
-    (batch,) = forest._frame(found, what, focal(), Look()).points
+    (batch,) = forest._frame(found, what, EYE, SIZE, Look()).points
     away = found.distance[what.of[what.points]] - 1.0
     pixel = away / focal()
     expected = SURFELS.spacing.prefixes(pixel / 2)
@@ -107,7 +108,7 @@ def test_fading_surfels_are_fewer_not_smaller(forest: Forest) -> None:
     (mine,) = np.flatnonzero((what.of == pair[0]) & what.points)
     (other,) = np.flatnonzero((what.of == pair[0]) & ~what.points)
     assert 0 < what.kept[mine] < WHOLE and 0 < what.kept[other] < WHOLE
-    (batch,) = forest._frame(found, what, focal(), Look()).points
+    (batch,) = forest._frame(found, what, EYE, SIZE, Look()).points
     where = list(np.flatnonzero(what.points)).index(mine)
     all_of_them, radius = SURFELS.discs((found.distance[pair] - 1.0) / focal() / 2)
     assert batch.prefix[where] < all_of_them[0]
@@ -119,15 +120,28 @@ def test_tints_are_the_plants_own_or_paint(forest: Forest) -> None:
     found, what = chosen_at(forest)
     for color, expected in (("as it is", found.rows["tint"][0]), ("by level", PALETTE[1])):
         look = Look(color=color)  # type: ignore[arg-type]
-        (batch,) = forest._frame(found, what, focal(), look).points
+        (batch,) = forest._frame(found, what, EYE, SIZE, look).points
         assert (batch.rows["tint"] == expected).all()
 
 
 def test_figures_tell_of_surfels(forest: Forest) -> None:
-    eye = Eye(np.array([0.0, 1.0, 0.0]), fov_y_deg=60.0)
     ctx = context()
     with framebuffer_kept(ctx), Screen(ctx) as screen:
         screen.begin(SIZE, (0.0, 0.0, 0.0))
-        stats = forest.draw(eye, SIZE, Look())
+        stats = forest.draw(EYE, SIZE, Look())
         screen.resolve()
     assert stats.said[0].endswith(" surfels")
+
+
+def test_surfels_of_twice_the_size_are_a_quarter_as_many(forest: Forest) -> None:
+    """All over the picture, or where the fovea is not."""
+    found, what = chosen_at(forest)
+    fovea = Fovea((1e-9, 2e-9), (1.0, 2.0))
+    aside = replace(EYE, yaw_deg=15.0)
+    eyes = ((EYE, Look(surfel_px=2.0)), (aside, Look(fovea=fovea)))
+    (one,) = forest._frame(found, what, EYE, SIZE, Look()).points
+    for eye, look in eyes:
+        (other,) = forest._frame(found, what, eye, SIZE, look).points
+        assert one.prefix[-2:] / other.prefix[-2:] == pytest.approx([4.0, 4.0], rel=0.1)
+    (same,) = forest._frame(found, what, EYE, SIZE, Look(fovea=fovea)).points
+    assert (same.prefix == one.prefix).all(), "in the middle"

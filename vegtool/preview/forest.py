@@ -32,6 +32,7 @@ from vegtool.preview.choice import (
 )
 from vegtool.preview.correction import NONE, Correction
 from vegtool.preview.eye import Eye
+from vegtool.preview.fovea import factors
 from vegtool.preview.options import FadeMode
 from vegtool.preview.palette import PALETTE, Color
 from vegtool.preview.points import point_batches
@@ -127,7 +128,7 @@ class Forest(OnGpu):
             raise ValueError("Forest.draw: load it first")
         started = perf_counter()
         found, what, tiles = self.choose(eye, size, look)
-        drawn_frame = self._frame(found, what, eye.focal_px(size[1]), look)
+        drawn_frame = self._frame(found, what, eye, size, look)
         chosen_at = perf_counter()
         view = VIEWS.get(look.color, "painted")
         drawn = landscape.draw(
@@ -160,7 +161,7 @@ class Forest(OnGpu):
         if landscape is None:
             raise ValueError("Forest.picture: load it first")
         found, what, _ = self.choose(eye, size, look)
-        drawn = self._frame(found, what, eye.focal_px(size[1]), look)
+        drawn = self._frame(found, what, eye, size, look)
         return picture(landscape, drawn, eye.shot(*size), look.light, supersample, samples)
 
     def choose(
@@ -186,10 +187,21 @@ class Forest(OnGpu):
             levels[:] = before[end - len(levels) : end]
         return found, what, tiles
 
-    def _frame(self, found: Seen, what: Chosen, focal_px: float, look: Look) -> Frame:
+    def _frame(
+        self, found: Seen, what: Chosen, eye: Eye, size: tuple[int, int], look: Look
+    ) -> Frame:
         assert self._landscape is not None
-        paint = self._paint(found, what, look.color)
-        points = point_batches(self._landscape, found, what, focal_px, 1.0, paint)
+        paint, focal = self._paint(found, what, look.color), eye.focal_px(size[1])
+        if not what.points.any():
+            return frame(found, what, paint)
+        kinds, stock = self._kinds_for(focal), found.rows
+        size_px = np.full(len(stock), look.surfel_px)
+        if look.fovea is not None:
+            kind, scale = stock["species"], stock["scale"]
+            middle = found.place.astype(np.float64)
+            middle[:, 1] += scale * kinds.center[kind]
+            size_px *= factors(look.fovea, middle, scale * kinds.radius[kind], eye, size)
+        points = point_batches(self._landscape, found, what, focal, size_px, paint)
         return replace(frame(found, what, paint), points=points)
 
     def _paint(self, found: Seen, what: Chosen, color: Color) -> np.ndarray | None:

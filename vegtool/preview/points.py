@@ -8,21 +8,22 @@ from __future__ import annotations
 
 import numpy as np
 
-from vegtool.arrays import ByteArray
+from vegtool.arrays import ByteArray, FloatArray
 from vegtool.gl.instances import WHOLE
 from vegtool.gl.landscape import Landscape, PointBatch
 from vegtool.preview.choice import Chosen, Seen, width
 
 
 def point_batches(
-    landscape: Landscape, found: Seen, what: Chosen, focal_px: float, size_px: float = 1.0,
-    paint: ByteArray | None = None,
+    landscape: Landscape, found: Seen, what: Chosen, focal_px: float,
+    size_px: FloatArray | None = None, paint: ByteArray | None = None,
 ) -> tuple[PointBatch, ...]:  # fmt: skip
     """What was chosen that is surfels.
 
-    focal_px: pixels of a metre at a distance of one. size_px: diameter of discs in pixels, where
-    there are as many surfels as that takes. paint: (m, 4) in place of the plants' own tints. Of
-    plants that fade, fewer are drawn; discs stay as they are.
+    focal_px: pixels of a metre at a distance of one. size_px: (n,) of each plant that is seen, the
+    diameter of discs in pixels, where there are as many surfels as that takes; None for 1. paint:
+    (m, 4) in place of the plants' own tints. Of plants that fade, fewer are drawn; discs stay as
+    they are.
     """
     batches = []
     for index in np.unique(what.model[what.points]):
@@ -31,7 +32,9 @@ def point_batches(
         place, scale = found.place[what.of[here]].astype(np.float64), stock["scale"]
         turn = np.arctan2(stock["turn"][:, 1], stock["turn"][:, 0])
         pixel = surfels.pixels(np.zeros(3), place, turn, scale, focal_px)
-        prefix, radius = surfels.surfels.discs(size_px * pixel / 2)
+        if size_px is not None:
+            pixel = size_px[what.of[here]] * pixel
+        prefix, radius = surfels.surfels.discs(pixel / 2)
         share = np.minimum(what.kept[here] / WHOLE, 1.0)
         rows = surfels.instances(
             np.zeros(3), place, turn, scale, radius * what.length[here],

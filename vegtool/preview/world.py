@@ -79,7 +79,7 @@ class World:
     @property
     def progressive(self) -> bool:
         """Whether there are surfels among the levels."""
-        return False
+        return any(one.surfels is not None for one in self.species)
 
     def scenery(self, fade: FadeMode) -> Scenery:
         """What draws it; nothing is uploaded yet."""
@@ -94,6 +94,9 @@ class World:
                 f"{len(level.faces):,} triangles" + (f" from {away:.3g} m" if away else "")
                 for level, away in zip(one.levels, away_m, strict=True)
             ]
+            if one.surfels is not None:
+                from_m = one.surfels.switch_m * focal_px / one.focal_px
+                levels.append(f"surfels from {from_m:.3g} m")
             found.append(f"{one.name}: {', '.join(levels)} ({one.files[0]})")
         return found
 
