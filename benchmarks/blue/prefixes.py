@@ -1,0 +1,158 @@
+"""Pictures of prefixes of several orders of the same candidates, beside the original.
+
+Discs are the same for all: as large as prefixes of our order ask for. An order at random would ask
+for discs of half the size by its own distances, and leave more holes. Single pixels are the paper's
+(section 6 states what comes of it), means are ours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+from scipy.spatial import cKDTree
+from solids import airplane, armadillo
+from solids.airplane import FINE
+
+from blue.orders import random_order
+from vegtool.arrays import FloatArray, IntArray, Picture
+from vegtool.gl.points import SurfelSetBuffers
+from vegtool.gl.upload import PlantBuffers
+from vegtool.growth import sample
+from vegtool.lighting.light import Light
+from vegtool.lod import Display
+from vegtool.measure.metrics import reference, score
+from vegtool.measure.pictures import live_surfels, truth
+from vegtool.measure.views import Camera, around, distance_of, views
+from vegtool.plant import Plant
+from vegtool.surfel_set import SurfelSet
+from vegtool.surfels.blue.candidates import Candidates, candidates
+from vegtool.surfels.blue.make import surfels_of
+from vegtool.surfels.blue.randomised import randomised_order
+
+MODELS: dict[str, Callable[[], Plant]] = {
+    "tree": lambda: sample("broadleaf"),
+    "statue": armadillo,
+    "airplane": lambda: airplane(FINE),
+}
+POINTS = 100_000
+PREFIXES = (100, 300, 1_000, 3_000, 10_000, 30_000, POINTS)
+PIXELS = 400.0
+"""Of the model's longest side."""
+VIEWS = 6
+SCORES = ("flip", "ssim", "false_holes", "coverage_bias")
+SHOWN = ("tree", "statue")
+SHOWN_PREFIXES = (100, 1_000, 10_000, POINTS)
+SHOWN_PIXELS = 290.0
+SHOWN_VIEW = 2
+DISPLAY = Display()
+SLIGHTLY = 1e-9
+"""More than the radius, relative: a prefix's own radius is that of no longer one by rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scores:
+    """Of a prefix of an order, means of VIEWS. disc_px: mean diameter of the discs, as seen at the
+    nearest point of the bounds."""
+
+    model: str
+    order: str
+    points: int
+    disc_px: float
+    means: Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """A prefix of ours: a picture as large as all, and one of as many pixels as it is meant for,
+    where discs are a pixel large; beside each, the original."""
+
+    points: int
+    large: Picture
+    large_truth: Picture
+    own: Picture
+    own_truth: Picture
+
+
+def measured(name: str) -> tuple[list[Scores], list[Shown]]:
+    """Of one of MODELS. Pictures where it is SHOWN."""
+    plant = MODELS[name]()
+    with PlantBuffers(plant) as original, ExitStack() as stack:
+        some = {
+            order: stack.enter_context(SurfelSetBuffers(one))
+            for order, one in sets(original).items()
+        }
+        found = list(scores(name, original, some))
+        pictures = list(shown(original, some["ours"])) if name in SHOWN else []
+    return found, pictures
+
+
+def sets(original: PlantBuffers) -> dict[str, SurfelSet]:
+    """Surfels by order, of the same candidates."""
+    found = candidates(original)
+    ours = surfels_of(original, POINTS)
+    same = cKDTree(found.position).query(ours.position)[1]
+    return {
+        "random": single(ours, found, random_order(found.position, POINTS)),
+        "randomised": single(ours, found, randomised_order(found.position, POINTS)),
+        "ours, single": single(ours, found, same),
+        "ours": ours,
+    }
+
+
+def single(ours: SurfelSet, found: Candidates, order: IntArray) -> SurfelSet:
+    """Single pixels in an order, with our discs."""
+    some = found.of(order)
+    return replace(ours, position=some.position, normal=some.normal, color=some.color)
+
+
+def scores(
+    model: str, original: PlantBuffers, some: Mapping[str, SurfelSetBuffers]
+) -> Iterator[Scores]:
+    seen = []
+    for view in views("all", VIEWS):
+        camera, light = camera_of(original.plant, view.direction, PIXELS), Light(view.sun)
+        seen.append((camera, light, reference(truth(original, camera, light))))
+    for (order, buffers), points in product(some.items(), PREFIXES):
+        found = [
+            score(true, prefix_of(buffers, points, camera, light)) for camera, light, true in seen
+        ]
+        disc = np.mean([size_px(buffers, points, camera) for camera, _, _ in seen])
+        means = {key: float(np.mean([one[key] for one in found])) for key in SCORES}
+        yield Scores(model, order, points, float(disc), means)
+
+
+def shown(original: PlantBuffers, buffers: SurfelSetBuffers) -> Iterator[Shown]:
+    view = views("all", VIEWS)[SHOWN_VIEW]
+    light, plant = Light(view.sun), original.plant
+    camera = camera_of(plant, view.direction, SHOWN_PIXELS)
+    whole = truth(original, camera, light)
+    for points in SHOWN_PREFIXES:
+        large = prefix_of(buffers, points, camera, light)
+        own = plant.extent / (2 * buffers.surfels.spacing.radius(points))
+        near = camera_of(plant, view.direction, own)
+        yield Shown(
+            points, large, whole,
+            prefix_of(buffers, points, near, light), truth(original, near, light),
+        )  # fmt: skip
+
+
+def prefix_of(buffers: SurfelSetBuffers, points: int, camera: Camera, light: Light) -> Picture:
+    """What a viewer shows that is content with the discs of such a prefix."""
+    return live_surfels(buffers, camera, light, size_px(buffers, points, camera))
+
+
+def size_px(buffers: SurfelSetBuffers, points: int, camera: Camera) -> float:
+    """Pixels: diameter of the discs of a prefix, at the nearest point of the bounds."""
+    one = np.ones(1)
+    pixel_m = buffers.pixels(camera.eye, np.zeros((1, 3)), 0 * one, one, camera.focal_px)
+    radius = (1 + SLIGHTLY) * buffers.surfels.spacing.radius(points)
+    return 2 * radius / float(pixel_m[0])
+
+
+def camera_of(plant: Plant, direction: FloatArray, longest_px: float) -> Camera:
+    away = distance_of(plant, DISPLAY, longest_px)
+    return around(plant.positions, direction, away, DISPLAY)
