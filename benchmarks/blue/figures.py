@@ -15,10 +15,13 @@ from vegtool.surfels.blue.distances import relative
 
 VIOLINS = (1_000, 5_000, 10_000)
 """Points of prefixes of figure 3, of orders of as many as the last."""
-TITLES = {"random": "at random", "randomised": "the paper's", "ours": "ours", "exact": "exact"}
-COLORS = {
-    "random": "#888888", "randomised": "#e69f00", "ours, single": "#56b4e9", "ours": "#0072b2",
-}  # fmt: skip
+TITLES = {"random": "random", "randomised": "paper's", "ours": "ours", "exact": "exact"}
+STYLES = {
+    "random": ("#888888", "random"),
+    "randomised": ("#e69f00", "paper's"),
+    "ours, single": ("#56b4e9", "ours, single pixels"),
+    "ours": ("#0072b2", "ours"),
+}
 NAMES = {"flip": "FLIP, less is better", "ssim": "SSIM, more is better"}
 GAP, LINE, QUALITY = 8, 20, 84
 PAPER, INK = (250, 250, 248), (30, 34, 38)
@@ -36,25 +39,27 @@ def violins(file: Path, found: Orders) -> None:
         axes.violinplot(data, showextrema=True, widths=0.8)
         axes.boxplot(data, widths=0.12, showfliers=False, whis=0.0, showcaps=False)
         axes.set_xticks(range(1, len(TITLES) + 1), list(TITLES.values()))
-        axes.set(title=f"{prefix:,} points", ylim=(0, None))
+        axes.set_title(f"{prefix:,} points")
         axes.spines[["top", "right"]].set_visible(False)
+    panels[0].set_ylim(0)
     panels[0].set_ylabel("relative distance to the nearest other")
     figure.savefig(file, dpi=110)
 
 
 def errors(file: Path, found: Sequence[Scores]) -> None:
-    """Error against points."""
+    """Error against points, discs as asked."""
     from matplotlib.figure import Figure
 
+    asked = [one for one in found if one.factor is None]
     figure = Figure(figsize=(10, 5.6), layout="constrained")
     panels = figure.subplots(len(NAMES), len(MODELS), sharex=True, sharey="row")
     for row, (key, name) in zip(panels, NAMES.items(), strict=True):
         for axes, model in zip(row, MODELS, strict=True):
-            for order, color in COLORS.items():
-                those = [s for s in found if s.model == model and s.order == order]
+            for order, (color, label) in STYLES.items():
+                those = [s for s in asked if s.model == model and s.order == order]
                 values = [one.means[key] for one in those]
                 axes.plot([one.points for one in those], values, "o-", ms=3, color=color,
-                          label=order)  # fmt: skip
+                          label=label)  # fmt: skip
             axes.set(xscale="log", xlim=(PREFIXES[0], PREFIXES[-1]))
             axes.spines[["top", "right"]].set_visible(False)
         row[0].set_ylabel(name)

@@ -2,15 +2,14 @@
 
 Discs are the same for all: as large as prefixes of our order ask for. An order at random would ask
 for discs of half the size by its own distances, and leave more holes. Single pixels are the paper's
-(section 6 states what comes of it), means are ours.
+(section 6 states what comes of it), means are ours. Some prefixes are drawn again, with discs that
+cover, in each order, as much as the original does.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -24,7 +23,7 @@ from vegtool.gl.upload import PlantBuffers
 from vegtool.growth import sample
 from vegtool.lighting.light import Light
 from vegtool.lod import Display
-from vegtool.measure.metrics import reference, score
+from vegtool.measure.metrics import Reference, reference, score
 from vegtool.measure.pictures import live_surfels, truth
 from vegtool.measure.views import Camera, around, distance_of, views
 from vegtool.plant import Plant
@@ -43,6 +42,11 @@ PREFIXES = (100, 300, 1_000, 3_000, 10_000, 30_000, POINTS)
 PIXELS = 400.0
 """Of the model's longest side."""
 VIEWS = 6
+EQUAL_PREFIXES = (1_000, 10_000, POINTS)
+FACTORS, HALVINGS = (0.25, 2.0), 6
+"""Of radii of discs, among which those are looked for that cover as much."""
+EVERY = 2
+"""Views of which one is looked at for that."""
 SCORES = ("flip", "ssim", "false_holes", "coverage_bias")
 SHOWN = ("tree", "statue")
 SHOWN_PREFIXES = (100, 1_000, 10_000, POINTS)
@@ -55,14 +59,25 @@ SLIGHTLY = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Scores:
-    """Of a prefix of an order, means of VIEWS. disc_px: mean diameter of the discs, as seen at the
-    nearest point of the bounds."""
+    """Of a prefix of an order, means of VIEWS. disc_px: mean diameter of the discs that it asks
+    for, as seen at the nearest point of the bounds. factor: of their radii, where discs are such
+    that they cover as much as the original; None where they are as asked."""
 
     model: str
     order: str
     points: int
     disc_px: float
+    factor: float | None
     means: Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """One picture to be compared with."""
+
+    camera: Camera
+    light: Light
+    true: Reference
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,14 +94,19 @@ class Shown:
 
 def measured(name: str) -> tuple[list[Scores], list[Shown]]:
     """Of one of MODELS. Pictures where it is SHOWN."""
-    plant = MODELS[name]()
-    with PlantBuffers(plant) as original, ExitStack() as stack:
-        some = {
-            order: stack.enter_context(SurfelSetBuffers(one))
-            for order, one in sets(original).items()
-        }
-        found = list(scores(name, original, some))
-        pictures = list(shown(original, some["ours"])) if name in SHOWN else []
+    plant, found, pictures = MODELS[name](), [], []
+    with PlantBuffers(plant) as original:
+        seen = sights(original)
+        for order, some in sets(original).items():
+            with SurfelSetBuffers(some) as buffers:
+                for points in PREFIXES:
+                    found.append(scores(name, order, buffers, points, seen))
+                if order == "ours" and name in SHOWN:
+                    pictures = list(shown(original, buffers))
+            for points in EQUAL_PREFIXES:
+                factor = covering(some, points, seen[::EVERY])
+                with resized(some, factor) as buffers:
+                    found.append(scores(name, order, buffers, points, seen, factor))
     return found, pictures
 
 
@@ -109,20 +129,41 @@ def single(ours: SurfelSet, found: Candidates, order: IntArray) -> SurfelSet:
     return replace(ours, position=some.position, normal=some.normal, color=some.color)
 
 
-def scores(
-    model: str, original: PlantBuffers, some: Mapping[str, SurfelSetBuffers]
-) -> Iterator[Scores]:
-    seen = []
+def sights(original: PlantBuffers) -> list[Sight]:
+    found = []
     for view in views("all", VIEWS):
         camera, light = camera_of(original.plant, view.direction, PIXELS), Light(view.sun)
-        seen.append((camera, light, reference(truth(original, camera, light))))
-    for (order, buffers), points in product(some.items(), PREFIXES):
-        found = [
-            score(true, prefix_of(buffers, points, camera, light)) for camera, light, true in seen
-        ]
-        disc = np.mean([size_px(buffers, points, camera) for camera, _, _ in seen])
-        means = {key: float(np.mean([one[key] for one in found])) for key in SCORES}
-        yield Scores(model, order, points, float(disc), means)
+        found.append(Sight(camera, light, reference(truth(original, camera, light))))
+    return found
+
+
+def scores(
+    model: str, order: str, buffers: SurfelSetBuffers, points: int, seen: Sequence[Sight],
+    factor: float | None = None,
+) -> Scores:  # fmt: skip
+    found = [score(one.true, prefix_of(buffers, points, one.camera, one.light)) for one in seen]
+    disc = float(np.mean([size_px(buffers, points, one.camera) for one in seen]))
+    means = {key: float(np.mean([one[key] for one in found])) for key in SCORES}
+    return Scores(model, order, points, disc, factor, means)
+
+
+def resized(some: SurfelSet, factor: float) -> SurfelSetBuffers:
+    """The same with all discs so many times as large as their spacing says."""
+    return SurfelSetBuffers(replace(some, covering=np.full(1, factor)))
+
+
+def covering(some: SurfelSet, points: int, seen: Sequence[Sight]) -> float:
+    """The factor with which a prefix covers as much of pictures as the original does: coverage
+    grows with it."""
+    low, high = FACTORS
+    for _ in range(HALVINGS):
+        middle, more = (low * high) ** 0.5, 0.0
+        with resized(some, middle) as buffers:
+            for one in seen:
+                picture = prefix_of(buffers, points, one.camera, one.light)
+                more += float(picture[..., 3].sum(dtype=np.float64)) - one.true.covered
+        low, high = (low, middle) if more > 0 else (middle, high)
+    return float((low * high) ** 0.5)
 
 
 def shown(original: PlantBuffers, buffers: SurfelSetBuffers) -> Iterator[Shown]:

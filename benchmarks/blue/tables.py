@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
 
-from blue.orders import SIZES, Order, Orders
+from blue.orders import METHODS, SIZES, Order, Orders
 from blue.plate import Sides
-from blue.prefixes import MODELS, PREFIXES, Scores
+from blue.prefixes import EQUAL_PREFIXES, MODELS, PREFIXES, Scores
+from blue.seen import Found
 from vegtool.arrays import FloatArray
 
 Rows = list[dict[str, Any]]
@@ -51,36 +53,35 @@ def _spent(what: str, ms: FloatArray) -> dict[str, float]:
 
 
 def order_table(found: Orders) -> Rows:
-    """The paper's table 2 and ours, size by size."""
-    seen, rows = found.pictured, []
+    """The paper's table 2, and ours below each of its rows."""
+    seen, sizes = found.pictured, {points: found.of(points) for points in SIZES}
     before = float(np.median(seen.render_ms) + np.median(seen.set_up_ms))
-    for points in SIZES:
-        theirs = SAMPLING_MS[points]
-        rows.append(
-            {
-                "points": points,
-                "order": "the paper's, as printed",
-                "render": RENDER_MS,
-                "set up": SET_UP_MS,
-                "sampling": theirs,
-                "of the paper's order": "",
-                "in all": RENDER_MS + SET_UP_MS + theirs,
-            }
-        )
-        for name, one in found.of(points).items():
-            part = np.median(one.cpu_ms) / np.median(found.of(points)["randomised"].cpu_ms)
-            rows.append(
-                {
-                    "points": points,
-                    "order": name,
-                    "render": spread(seen.render_ms),
-                    "set up": spread(seen.set_up_ms),
-                    "sampling": spread(one.cpu_ms),
-                    "of the paper's order": f"{part:.2f}",
-                    "in all": f"{before + np.median(one.cpu_ms):.0f}",
-                }
-            )
-    return rows
+
+    def row(what: str, cells: Mapping[int, Any]) -> dict[str, Any]:
+        return {"ms": what, **{f"{points:,}": cells[points] for points in SIZES}}
+
+    def all_alike(value: Any) -> dict[int, Any]:
+        return dict.fromkeys(SIZES, value)
+
+    rows = [
+        row("render, as printed", all_alike(RENDER_MS)),
+        row("render", all_alike(spread(seen.render_ms))),
+        row("set up, as printed", all_alike(SET_UP_MS)),
+        row("set up", all_alike(spread(seen.set_up_ms))),
+        row("sampling, as printed", SAMPLING_MS),
+    ]
+    for name in METHODS:
+        ms = {points: spread(some[name].cpu_ms) for points, some in sizes.items()}
+        rows.append(row(f"sampling, {name}", ms))
+    parts = {
+        points: f"{np.median(some['ours'].cpu_ms) / np.median(some['randomised'].cpu_ms):.2f}"
+        for points, some in sizes.items()
+    }
+    rows.append(row("ours over randomised", parts))
+    sums = {points: RENDER_MS + SET_UP_MS + ms for points, ms in SAMPLING_MS.items()}
+    rows.append(row("in all, as printed", sums))
+    ours = {p: f"{before + np.median(some['ours'].cpu_ms):.0f}" for p, some in sizes.items()}
+    return [*rows, row("in all, ours", ours)]
 
 
 def spread(ms: FloatArray) -> str:
@@ -123,6 +124,7 @@ def picture_rows(found: Sequence[Scores]) -> Rows:
             "order": one.order,
             "points": one.points,
             "disc_px": round(one.disc_px, 2),
+            "factor": "as asked" if one.factor is None else round(one.factor, 3),
             **{key: round(value, 4) for key, value in one.means.items()},
         }
         for one in found
@@ -130,20 +132,48 @@ def picture_rows(found: Sequence[Scores]) -> Rows:
 
 
 def picture_table(found: Sequence[Scores]) -> Rows:
-    """A row for each model and prefix: errors of every order."""
-    at = {(one.model, one.points, one.order): one for one in found}
-    names = list(dict.fromkeys(one.order for one in found))
+    """A row for each model and prefix: errors of every order, discs as asked."""
+    return _beside(found, PREFIXES, equal=False)
+
+
+def equal_table(found: Sequence[Scores]) -> Rows:
+    """The same where all cover as much as the original."""
+    return _beside(found, EQUAL_PREFIXES, equal=True)
+
+
+def _beside(found: Sequence[Scores], prefixes: Sequence[int], equal: bool) -> Rows:
+    those = [one for one in found if (one.factor is not None) == equal]
+    at = {(one.model, one.points, one.order): one for one in those}
+    names = list(dict.fromkeys(one.order for one in those))
     rows = []
-    for model in MODELS:
-        for points in PREFIXES:
-            some = [at[model, points, name] for name in names]
-            row: dict[str, Any] = {"model": model, "points": points}
-            row["disc, px"] = f"{some[0].disc_px:.1f}"
-            for key in ("flip", "ssim"):
-                for name, one in zip(names, some, strict=True):
-                    row[f"{key}: {name}"] = f"{one.means[key]:.3f}"
-            rows.append(row)
+    for model, points in product(MODELS, prefixes):
+        some = {name: at[model, points, name] for name in names}
+        row: dict[str, Any] = {"model": model, "points": points}
+        if not equal:
+            row["disc, px"] = f"{some[names[0]].disc_px:.1f}"
+        for key in ("flip", "ssim"):
+            for name, one in some.items():
+                row[f"{key}: {name}"] = f"{one.means[key]:.3f}"
+        if equal:
+            for name, one in some.items():
+                row[f"radius: {name}"] = f"{one.factor:.2f}"
+        rows.append(row)
     return rows
+
+
+def seen_rows(found: Sequence[Found]) -> Rows:
+    return [
+        {
+            "model": one.model,
+            "triangles": one.triangles,
+            "of_eight": one.candidates[0],
+            "missed_by_eight": f"{one.missed[0]:.3%}",
+            "candidates": one.candidates[1],
+            "missed": f"{one.missed[1]:.3%}",
+            "cpu_seconds": round(one.cpu_s, 1),
+        }
+        for one in found
+    ]
 
 
 def plate_rows(found: Sequence[Sides]) -> Rows:
