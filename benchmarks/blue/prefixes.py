@@ -17,7 +17,7 @@ from solids import airplane, armadillo
 from solids.airplane import FINE
 
 from blue.orders import random_order
-from vegtool.arrays import FloatArray, IntArray, Picture
+from vegtool.arrays import FloatArray, Picture
 from vegtool.gl.points import SurfelSetBuffers
 from vegtool.gl.upload import PlantBuffers
 from vegtool.growth import sample
@@ -28,8 +28,8 @@ from vegtool.measure.pictures import live_surfels, truth
 from vegtool.measure.views import Camera, around, distance_of, views
 from vegtool.plant import Plant
 from vegtool.surfel_set import SurfelSet
-from vegtool.surfels.blue.candidates import Candidates, candidates
-from vegtool.surfels.blue.make import surfels_of
+from vegtool.surfels.blue.candidates import candidates
+from vegtool.surfels.blue.make import ordered, surfels_of
 from vegtool.surfels.blue.randomised import randomised_order
 
 MODELS: dict[str, Callable[[], Plant]] = {
@@ -59,9 +59,9 @@ SLIGHTLY = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Scores:
-    """Of a prefix of an order, means of VIEWS. disc_px: mean diameter of the discs that it asks
-    for, as seen at the nearest point of the bounds. factor: of their radii, where discs are such
-    that they cover as much as the original; None where they are as asked."""
+    """Of a prefix of an order, means of VIEWS. disc_px: mean diameter of its discs, as seen at the
+    nearest point of the bounds. factor: of their radii, where discs are such that they cover as
+    much as the original; None where they are as asked."""
 
     model: str
     order: str
@@ -114,19 +114,18 @@ def sets(original: PlantBuffers) -> dict[str, SurfelSet]:
     """Surfels by order, of the same candidates."""
     found = candidates(original)
     ours = surfels_of(original, POINTS)
-    same = cKDTree(found.position).query(ours.position)[1]
+    plain = ordered(found, POINTS, unlit=ours.unlit)  # all discs as large as their spacing says
+    at_random = found.of(random_order(found.position, POINTS))
+    papers = found.of(randomised_order(found.position, POINTS))
+    same = found.of(cKDTree(found.position).query(ours.position)[1])
     return {
-        "random": single(ours, found, random_order(found.position, POINTS)),
-        "randomised": single(ours, found, randomised_order(found.position, POINTS)),
-        "ours, single": single(ours, found, same),
+        **{
+            name: replace(plain, position=some.position, normal=some.normal, color=some.color)
+            for name, some in {"random": at_random, "randomised": papers}.items()
+        },
+        "ours, single": replace(ours, normal=same.normal, color=same.color),
         "ours": ours,
     }
-
-
-def single(ours: SurfelSet, found: Candidates, order: IntArray) -> SurfelSet:
-    """Single pixels in an order, with our discs."""
-    some = found.of(order)
-    return replace(ours, position=some.position, normal=some.normal, color=some.color)
 
 
 def sights(original: PlantBuffers) -> list[Sight]:
@@ -148,8 +147,9 @@ def scores(
 
 
 def resized(some: SurfelSet, factor: float) -> SurfelSetBuffers:
-    """The same with all discs so many times as large as their spacing says."""
-    return SurfelSetBuffers(replace(some, covering=np.full(1, factor)))
+    """The same with discs of so many times the radius."""
+    spacing = replace(some.spacing, radius_m=factor * some.spacing.radius_m)
+    return SurfelSetBuffers(replace(some, spacing=spacing))
 
 
 def covering(some: SurfelSet, points: int, seen: Sequence[Sight]) -> float:
