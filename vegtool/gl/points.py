@@ -26,6 +26,9 @@ PER_INSTANCE = (("in_place", "4f", 0), ("in_turn_size", "3f", 16))
 """Attributes: name, format and offset."""
 
 
+SOFT = True
+
+
 class SurfelSetBuffers(OnGpu):
     """Surfels on the GPU, relative to their middle in units of their radius, both as they are
     bounded. A context manager: leaving releases."""
@@ -95,16 +98,20 @@ class SurfelSetBuffers(OnGpu):
         """
         defines = {
             "UNLIT": self.surfels.unlit, "PAINTED": paint is not None,
+            "SOFT_EDGES": SOFT and self.ctx.fbo.samples > 0,
             f"OVERDRAW {OVERDRAW_STEP}": view == "overdraw",
         }  # fmt: skip
         told = [name for name, wanted in defines.items() if wanted]
         shader = program(self.ctx, "point.vert", "point.frag", *told)
         matrix = shot.view_projection
         shader["view_projection"] = tuple(matrix.T.ravel())
+        size = footprint * shot.width, footprint * shot.height
+        across = matrix[:2, :3] - np.outer(matrix[:2, :3] @ matrix[3, :3], matrix[3, :3])
+        pixel = across * (2 / np.array(size) / (across**2).sum(axis=1))[:, None]
         for name, value in (
-            ("unprojection", tuple(np.linalg.inv(matrix).T.ravel())),
-            ("size", (footprint * shot.width, footprint * shot.height)),
-            ("focal", footprint * float(np.linalg.norm(matrix[0, :3])) * shot.width / 2),
+            ("right", tuple(pixel[0])),
+            ("up", tuple(pixel[1])),
+            ("size", size),
             ("paint", paint),
         ):
             if name in shader:

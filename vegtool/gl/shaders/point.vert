@@ -9,14 +9,17 @@ in vec4 in_place;      // metres from the eye to the plant's center; metres of a
 in vec3 in_turn_size;  // cosine and sine of its turn about y; radius of the discs, in its unit
 
 uniform mat4 view_projection;
-uniform float focal;   // pixels of a metre at a distance of one
+uniform vec3 right;    // of a pixel at a distance of one, metres
+uniform vec3 up;
+uniform vec2 size;     // of the picture, pixels
 #ifdef PAINTED
 uniform vec3 paint;
 #endif
 
-flat out vec3 center;
-flat out vec3 normal;
-flat out float radius;
+flat out vec2 middle;  // pixels
+flat out vec2 nearing; // of one over the distance on the disc's plane: its part, per pixel
+flat out vec3 ellipse; // of the disc: its quadratic form, times that squared
+flat out vec3 depth;   // at the middle; of that part; most to either side
 flat out vec3 light;
 
 vec3 turned_about_y(vec3 v) {
@@ -25,9 +28,9 @@ vec3 turned_about_y(vec3 v) {
 }
 
 void main() {
-    center = in_place.w * turned_about_y(in_position) + in_place.xyz;
-    normal = turned_to(turned_about_y(in_normal), -center);
-    radius = in_place.w * in_turn_size.z;
+    vec3 center = in_place.w * turned_about_y(in_position) + in_place.xyz;
+    vec3 normal = turned_to(turned_about_y(in_normal), -center);
+    float radius = in_place.w * in_turn_size.z;
 #ifdef PAINTED
     vec3 color = paint;
 #else
@@ -39,7 +42,19 @@ void main() {
     light = shaded(Surface(color, normal, vec2(1.0), 0.0, vec3(1.0)), 1.0, 1.0);
 #endif
     gl_Position = view_projection * vec4(center, 1.0);
+    float away = gl_Position.w;
+    middle = (0.5 + 0.5 * gl_Position.xy / away) * size;
+
+    // A ray through a pixel, c + x X + y Y where it is as far away as the center c, meets the plane
+    // at q times c.n / (q.n); that is off the center by (x E + y F) / (1 + nearing.(x, y)).
+    vec3 x = away * right, y = away * up;
+    float facing = min(dot(center, normal), -1e-4 * length(center));
+    nearing = vec2(dot(x, normal), dot(y, normal)) / facing;
+    vec3 e = (x - center * nearing.x) / radius, f = (y - center * nearing.y) / radius;
+    ellipse = vec3(dot(e, e), 2.0 * dot(e, f), dot(f, f));
+    float far = view_projection[3][2];  // of depth, what goes with one over the distance
+    depth = vec3(0.5 + 0.5 * gl_Position.z / away, 0.5 * far / away, radius / away);
+
     // what is nearer by its radius looks larger by as much
-    float away = max(gl_Position.w - radius, 1e-3 * gl_Position.w);
-    gl_PointSize = 2.0 * radius * focal / away + 1.0;
+    gl_PointSize = 2.0 * radius / (length(right) * max(away - radius, 1e-3 * away)) + 1.0;
 }
