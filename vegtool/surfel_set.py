@@ -60,6 +60,7 @@ class SurfelSet:
     spacing: Spacing
     covering: FloatArray = field(default_factory=lambda: np.ones(1))
     unlit: bool = False
+    size: FloatArray | None = None
 
     def __post_init__(self) -> None:
         position = checked("SurfelSet.position", self.position, (None, 3), np.float64)

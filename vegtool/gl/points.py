@@ -39,7 +39,8 @@ class SurfelSetBuffers(OnGpu):
         self.center = (low + high) / 2
         self.unit = float(np.linalg.norm(high - low) / 2) or 1.0
         local = (surfels.position - self.center) / self.unit
-        rows = np.concatenate([local, surfels.normal, surfels.color], axis=1).astype(np.float32)
+        size = np.ones(len(local)) if surfels.size is None else surfels.size
+        rows = np.column_stack([local, surfels.normal, surfels.color, size]).astype(np.float32)
         self._vertices = self.ctx.buffer(np.ascontiguousarray(rows))
         self._rows = self.ctx.buffer(reserve=POINT_INSTANCE.itemsize, dynamic=True)
         self._arrays: dict[moderngl.Program, moderngl.VertexArray] = {}
@@ -136,8 +137,8 @@ class SurfelSetBuffers(OnGpu):
     def _array(self, shader: moderngl.Program, first: int) -> moderngl.VertexArray:
         if shader not in self._arrays:
             layout, names = [], []
-            for name in ("in_position", "in_normal", "in_color"):
-                layout.append("3f" if name in shader else "12x")
+            for name, many in (("in_position", 3), ("in_normal", 3), ("in_color", 3), ("in_size", 1)):
+                layout.append(f"{many}f" if name in shader else f"{4 * many}x")
                 names += [name] if name in shader else []
             content = [(self._vertices, " ".join(layout), *names)]
             self._arrays[shader] = self.ctx.vertex_array(shader, content)

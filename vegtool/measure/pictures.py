@@ -108,17 +108,25 @@ def live_surfels(
 ) -> Picture:
     """What our own viewer shows of surfels: discs of a diameter, in pixels, where there are as many
     as that takes; 4x multisampling."""
-    shot, light, one = shot_of(camera), light or Light(), np.ones(1)
-    foot, eye = np.zeros((1, 3)), camera.eye
-    pixel = buffers.pixels(eye, foot, 0 * one, one, camera.focal_px)
+    foot, one = np.zeros((1, 3)), np.ones(1)
+    pixel = buffers.pixels(camera.eye, foot, 0 * one, one, camera.focal_px)
     prefix, radius = buffers.surfels.discs(size_px * pixel / 2)
-    rows = buffers.instances(eye, foot, 0 * one, one, radius)
+    return live_prefix(buffers, camera, int(prefix[0]), float(radius[0]), light)
+
+
+def live_prefix(
+    buffers: SurfelSetBuffers, camera: Camera, prefix: int, radius_m: float,
+    light: Light | None = None,
+) -> Picture:  # fmt: skip
+    """The same of so many surfels, for discs of a radius, metres."""
+    shot, light, one = shot_of(camera), light or Light(), np.ones(1)
+    rows = buffers.instances(camera.eye, np.zeros((1, 3)), 0 * one, one, radius_m * one)
     moved = np.eye(4)
-    moved[:3, 3] = eye - camera.target
-    seen = Shot(shot.view_projection @ moved, eye, shot.width, shot.height)
+    moved[:3, 3] = camera.eye - camera.target
+    seen = Shot(shot.view_projection @ moved, camera.eye, shot.width, shot.height)
 
     def render(part: Shot) -> None:
-        buffers.draw(rows, prefix, part, light)
+        buffers.draw(rows, np.array([prefix]), part, light)
 
     return pictured(buffers.ctx, seen, render, 1, MSAA)
 

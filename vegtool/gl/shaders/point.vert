@@ -5,6 +5,7 @@
 in vec3 in_position;   // in the plant's frame and unit, from its center
 in vec3 in_normal;
 in vec3 in_color;      // linear
+in float in_size;      // of the radius
 in vec4 in_place;      // metres from the eye to the plant's center; metres of a unit
 in vec3 in_turn_size;  // cosine and sine of its turn about y; radius of the discs, in its unit
 
@@ -30,7 +31,7 @@ vec3 turned_about_y(vec3 v) {
 void main() {
     vec3 center = in_place.w * turned_about_y(in_position) + in_place.xyz;
     vec3 normal = turned_to(turned_about_y(in_normal), -center);
-    float radius = in_place.w * in_turn_size.z;
+    float radius = in_place.w * in_turn_size.z * in_size;
 #ifdef PAINTED
     vec3 color = paint;
 #else
