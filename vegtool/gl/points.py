@@ -22,11 +22,10 @@ from vegtool.surfel_set import SurfelSet
 POINT_INSTANCE = np.dtype([("place", "f4", 4), ("turn_size", "f4", 3)])
 """place: metres from the eye to the points' center, and metres of a unit. turn_size: cosine and
 sine of the turn about y, radius of the discs in that unit."""
+PER_SURFEL = (("in_position", 3), ("in_normal", 3), ("in_color", 3), ("in_size", 1))
+"""Attributes: name and floats."""
 PER_INSTANCE = (("in_place", "4f", 0), ("in_turn_size", "3f", 16))
 """Attributes: name, format and offset."""
-
-
-SOFT = True
 
 
 class SurfelSetBuffers(OnGpu):
@@ -39,9 +38,8 @@ class SurfelSetBuffers(OnGpu):
         self.center = (low + high) / 2
         self.unit = float(np.linalg.norm(high - low) / 2) or 1.0
         local = (surfels.position - self.center) / self.unit
-        size = np.ones(len(local)) if surfels.size is None else surfels.size
-        rows = np.column_stack([local, surfels.normal, surfels.color, size]).astype(np.float32)
-        self._vertices = self.ctx.buffer(np.ascontiguousarray(rows))
+        rows = np.column_stack([local, surfels.normal, surfels.color, surfels.size])
+        self._vertices = self.ctx.buffer(rows.astype(np.float32).tobytes())
         self._rows = self.ctx.buffer(reserve=POINT_INSTANCE.itemsize, dynamic=True)
         self._arrays: dict[moderngl.Program, moderngl.VertexArray] = {}
         self._pace = Pace(self.ctx)
@@ -61,7 +59,7 @@ class SurfelSetBuffers(OnGpu):
         """(n,) POINT_INSTANCE: surfels at so many places, as an eye (3,) sees them.
 
         foot: (n, 3) metres, of their origin. turn: (n,) radians about y. scale: (n,). radius: (n,)
-        metres of the discs, before scaling.
+        metres of the discs of size 1, before scaling.
         """
         cosine, sine = np.cos(turn), np.sin(turn)
         x, y, z = self.center
@@ -98,8 +96,9 @@ class SurfelSetBuffers(OnGpu):
         are alike to a power of two are one call, and have as many as the longest.
         """
         defines = {
-            "UNLIT": self.surfels.unlit, "PAINTED": paint is not None,
-            "SOFT_EDGES": SOFT and self.ctx.fbo.samples > 0,
+            "UNLIT": self.surfels.unlit, "DOUBLE_SIDED": self.surfels.double_sided,
+            "PAINTED": paint is not None,
+            "SOFT_EDGES": self.ctx.fbo.samples > 0,
             f"OVERDRAW {OVERDRAW_STEP}": view == "overdraw",
         }  # fmt: skip
         told = [name for name, wanted in defines.items() if wanted]
@@ -137,7 +136,12 @@ class SurfelSetBuffers(OnGpu):
     def _array(self, shader: moderngl.Program, first: int) -> moderngl.VertexArray:
         if shader not in self._arrays:
             layout, names = [], []
-            for name, many in (("in_position", 3), ("in_normal", 3), ("in_color", 3), ("in_size", 1)):
+            for name, many in (
+                ("in_position", 3),
+                ("in_normal", 3),
+                ("in_color", 3),
+                ("in_size", 1),
+            ):
                 layout.append(f"{many}f" if name in shader else f"{4 * many}x")
                 names += [name] if name in shader else []
             content = [(self._vertices, " ".join(layout), *names)]

@@ -5,7 +5,7 @@
 in vec3 in_position;   // in the plant's frame and unit, from its center
 in vec3 in_normal;
 in vec3 in_color;      // linear
-in float in_size;      // of the radius
+in float in_size;      // of the radius of the discs
 in vec4 in_place;      // metres from the eye to the plant's center; metres of a unit
 in vec3 in_turn_size;  // cosine and sine of its turn about y; radius of the discs, in its unit
 
@@ -30,7 +30,8 @@ vec3 turned_about_y(vec3 v) {
 
 void main() {
     vec3 center = in_place.w * turned_about_y(in_position) + in_place.xyz;
-    vec3 normal = turned_to(turned_about_y(in_normal), -center);
+    vec3 own = turned_about_y(in_normal), to_eye = normalize(-center);
+    vec3 normal = turned_to(own, to_eye);
     float radius = in_place.w * in_turn_size.z * in_size;
 #ifdef PAINTED
     vec3 color = paint;
@@ -40,7 +41,12 @@ void main() {
 #ifdef UNLIT
     light = color;
 #else
-    light = shaded(Surface(color, normal, vec2(1.0), 0.0, vec3(1.0)), 1.0, 1.0);
+#ifdef DOUBLE_SIDED
+    own = normal;
+#else
+    own = mirrored_to(own, to_eye);
+#endif
+    light = shaded(Surface(color, own, vec2(1.0), 0.0, vec3(1.0)), 1.0, 1.0);
 #endif
     gl_Position = view_projection * vec4(center, 1.0);
     float away = gl_Position.w;

@@ -1,10 +1,10 @@
-"""Sizes of surfels with which they cover as much of a picture as what they stand for.
+"""Sizes of discs with which surfels cover as much of a picture as what they stand for.
 
-Brandt et al. draw discs that leave no hole in a surface, and state that thin parts come out
-fattened (section 6). Here a disc is as large as that only where the surface goes on in all
-directions around it, which is asked as of boundaries of point sets (Bendels, Schnabel, Klein:
-Detecting holes in point set surfaces, 2006, the angle criterion). All others of a doubling of the
-prefix have a size in common, with which pictures have the right coverage.
+Brandt et al., section 6, state that thin parts come out fattened, as discs that leave no hole in a
+surface stand over its edges. Here a disc is as large as that only where the surface goes on in all
+directions around it: the angle criterion of Bendels, Schnabel, Klein: Detecting holes in point set
+surfaces (2006). All others by which a prefix doubles are smaller by one factor, with which pictures
+have the right coverage.
 """
 
 from __future__ import annotations
@@ -14,63 +14,71 @@ from dataclasses import replace
 
 import numpy as np
 
-from vegtool.arrays import FloatArray, Picture
+from vegtool.arrays import FloatArray, IntArray, Picture
 from vegtool.gl.points import SurfelSetBuffers
 from vegtool.lod import Display
 from vegtool.measure.pictures import live_prefix
 from vegtool.measure.views import Camera, around, views
 from vegtool.surfel_set import SurfelSet
 
-REACH = (0.6, 1.8)
-"""Of the radius of a disc: how far what its surface goes on with is away."""
-FLAT = 0.35
-"""Of the radius: how far off its plane that is at most."""
-NEIGHBOURS = 16
-"""That are looked at."""
-GAP = (2 * np.pi / 3, np.pi)
-"""Radians around it without any: up to which it is whole, and from which on it is an edge."""
-
-
-SOME = 2000
-"""Points whose distances tell those of a prefix."""
 FEWEST = 256
-"""Points of the shortest prefix whose pictures are compared; those before have sizes as in it."""
+"""Points of the shortest prefix of which pictures are compared; all of it have one factor."""
 VIEWS = 3
-"""Directions in which it is looked at."""
-SUPERSAMPLE = 4
-"""Samples per axis and pixel of what it is compared with."""
+"""Directions in which a prefix is looked at."""
 STEP = 0.75
-"""Factor from one size that is tried to the next, from 1 on."""
+"""Factor from a size that is tried to the next."""
 LEAST = 0.05
 """Size below which none is tried."""
 TOTAL = 0.5
 """How much a difference of the whole coverage counts, beside all differences of pixels."""
+
+REACH = (0.6, 1.8)
+"""Of the radius of a disc: how far away what its surface goes on with is."""
+FLAT = 0.35
+"""Of the radius: how far off its plane that is at most."""
+NEIGHBOURS = 16
+"""Points that are looked at, the nearest."""
+SOME = 2000
+"""Points whose distances are taken for those of all of a prefix."""
+GAP = (np.radians(120), np.radians(180))
+"""Radians around a disc in which nothing is: up to which it is inside, and from which on at an
+edge."""
 
 
 def sizes(surfels: SurfelSet, truth: Callable[[Camera], Picture]) -> FloatArray:
     """(n,) of the radius of discs. truth: a picture of what the surfels stand for."""
     whole = inside(surfels)
     size = np.ones(len(surfels))
+    if surfels.spacing.radius_m == 0:
+        return size  # a single place
     for first, length in doublings(len(surfels), FEWEST):
-        rows, radius = slice(first, length), surfels.spacing.radius(length)
-        cameras = cameras_of(surfels, length)
-        known = [truth(camera)[..., 3] for camera in cameras]
-
-        def sized(share: float) -> None:
-            size[rows] = share + (1 - share) * whole[rows]
-
-        def measured(share: float) -> tuple[float, float]:
-            sized(share)
-            with SurfelSetBuffers(replace(surfels, size=size)) as buffers:
-                off = [
-                    live_prefix(buffers, camera, length, radius)[..., 3] - picture
-                    for camera, picture in zip(cameras, known, strict=True)
-                ]
-            excess = sum(float(part.sum()) for part in off)
-            return excess, sum(float(np.abs(part).sum()) for part in off) + TOTAL * abs(excess)
-
-        sized(_share(measured))
+        rows = slice(first, length)
+        size[rows] = _sizes(surfels, size, whole[rows], rows, truth)
     return size
+
+
+def _sizes(
+    surfels: SurfelSet, size: FloatArray, whole: FloatArray, rows: slice,
+    truth: Callable[[Camera], Picture],
+) -> FloatArray:  # fmt: skip
+    """(m,) of rows that end a prefix. size: (n,) of those before. whole: (m,) how far inside."""
+    radius = surfels.spacing.radius(rows.stop)
+    cameras = _cameras(surfels, radius)
+    known = [truth(camera)[..., 3] for camera in cameras]
+    tried = size.copy()
+
+    def measured(share: float) -> tuple[float, float]:
+        tried[rows] = share + (1 - share) * whole
+        with SurfelSetBuffers(replace(surfels, size=tried)) as buffers:
+            off = [
+                live_prefix(buffers, camera, rows.stop, radius)[..., 3] - picture
+                for camera, picture in zip(cameras, known, strict=True)
+            ]
+        excess = sum(float(part.sum()) for part in off)
+        return excess, sum(float(np.abs(part).sum()) for part in off) + TOTAL * abs(excess)
+
+    share = _share(measured)
+    return share + (1 - share) * whole
 
 
 def _share(measured: Callable[[float], tuple[float, float]]) -> float:
@@ -88,63 +96,60 @@ def _share(measured: Callable[[float], tuple[float, float]]) -> float:
     return share
 
 
-def cameras_of(surfels: SurfelSet, length: int) -> list[Camera]:
-    """From where discs of a prefix are a pixel wide, in the middle of the surfels."""
+def _cameras(surfels: SurfelSet, radius_m: float) -> list[Camera]:
+    """To which discs of a radius are about a pixel wide."""
     display = Display()
-    away = 2 * surfels.spacing.radius(length) * display.pixels_per_metre(1.0)
+    away = 2 * radius_m * display.pixels_per_metre(1.0)
     away += float(np.linalg.norm(np.diff(surfels.bounds, axis=0)) / 2)
     return [around(surfels.position, view.direction, away, display) for view in views("all", VIEWS)]
 
 
 def inside(surfels: SurfelSet) -> FloatArray:
-    """(n,) 0 to 1: how far the surface goes on around each, on the scale of the discs that it is
-    first drawn with."""
+    """(n,) 0 to 1: how far the surface goes on around each, seen at the scale of the discs of the
+    prefix by which it has come."""
     total = len(surfels)
     result = np.zeros(total)
     if total < 2:
         return result
     from scipy.spatial import cKDTree
 
+    lengths = doublings(total, 2)
     trees, apart = {}, {}
-    for _, length in doublings(total, 2):
-        trees[length] = tree = cKDTree(surfels.position[:length])
-        apart[length] = np.median(tree.query(surfels.position[: min(length, SOME)], 2)[0][:, 1])
-    for first, length in doublings(total, 2):
-        rows = np.arange(first, length)
+    for _, length in lengths:
+        trees[length] = cKDTree(surfels.position[:length])
+        some = surfels.position[: min(length, SOME)]
+        apart[length] = float(np.median(trees[length].query(some, 2)[0][:, 1]))
+    for first, length in lengths:
         radius = surfels.spacing.radius(length)
-        # of more points than such discs need, as on what is thin, fewer tell as much
-        net = max((k for k in trees if k <= length and apart[k] >= REACH[0] * radius), default=2)
-        found = trees[net].query(
-            surfels.position[rows], min(NEIGHBOURS, net), distance_upper_bound=REACH[1] * radius
-        )
-        distance, index = (np.reshape(part, (len(rows), -1)) for part in found)
-        result[rows] = _whole(surfels, rows, distance, np.where(index < net, index, 0), radius)
+        # where there are more points than such discs need, as on what is thin, fewer tell as much
+        enough = [n for n in trees if n <= length and apart[n] >= REACH[0] * radius]
+        net = max(enough, default=2)
+        rows = np.arange(first, length, dtype=np.int32)
+        index = trees[net].query(surfels.position[rows], min(NEIGHBOURS, net))[1]
+        result[rows] = _inside(surfels, rows, index, radius)
     return result
 
 
-def doublings(total: int, least: int) -> list[tuple[int, int]]:
-    """Prefixes of doubling length, the last of all: of each, where what is new begins, and its
-    length."""
-    lengths = [least << k for k in range(max(((total - 1) // least).bit_length(), 0))]
-    ends = [*lengths, total]
-    return list(zip([0, *ends], ends))
-
-
-def _whole(surfels, rows, distance, index, radius):
+def _inside(surfels: SurfelSet, rows: IntArray, index: IntArray, radius: float) -> FloatArray:
+    """(m,) of rows (m,), by neighbours (m, k)."""
     normal = surfels.normal[rows]
     away = surfels.position[index] - surfels.position[rows][:, None]
-    height = np.einsum("nkc,nc->nk", away, normal)
-    near = (distance >= REACH[0] * radius) & (distance <= REACH[1] * radius)
-    near &= np.abs(height) <= FLAT * radius
-    least = np.eye(3)[np.abs(normal).argmin(axis=1)]
-    right = np.cross(normal, least)
+    distance = np.linalg.norm(away, axis=2)
+    height = np.abs(np.einsum("mkc,mc->mk", away, normal))
+    goes_on = (distance >= REACH[0] * radius) & (distance <= REACH[1] * radius)
+    goes_on &= height <= FLAT * radius
+    right = np.cross(normal, np.eye(3)[np.abs(normal).argmin(axis=1)])
     up = np.cross(normal, right)
-    angle = np.arctan2(np.einsum("nkc,nc->nk", away, up), np.einsum("nkc,nc->nk", away, right))
-    angle = np.sort(np.where(near, angle, np.inf), axis=1)
-    many = near.sum(axis=1)
-    gaps = np.diff(angle, axis=1, append=np.inf)
-    last = angle[np.arange(len(rows)), np.maximum(many - 1, 0)]
-    inner = np.where(np.isfinite(gaps), gaps, 0).max(axis=1)
-    around = np.maximum(inner, 2 * np.pi - (last - angle[:, 0]))
-    around = np.where(many > 1, around, 2 * np.pi)
-    return np.clip((GAP[1] - around) / (GAP[1] - GAP[0]), 0, 1)
+    angle = np.arctan2(*(np.einsum("mkc,mc->mk", away, axis) for axis in (up, right)))
+    any_one = angle[np.arange(len(rows)), goes_on.argmax(axis=1)]
+    angle = np.sort(np.where(goes_on, angle, any_one[:, None]), axis=1)
+    gap = np.diff(angle, axis=1, append=angle[:, :1] + 2 * np.pi).max(axis=1)
+    return np.asarray(np.clip((GAP[1] - gap) / (GAP[1] - GAP[0]), 0, 1))
+
+
+def doublings(total: int, least: int) -> list[tuple[int, int]]:
+    """What prefixes of doubling length add, from the shortest on, `least` or all, to all: where it
+    begins and ends."""
+    lengths = [least << k for k in range(((total - 1) // least).bit_length())]
+    ends = [*lengths, total]
+    return list(zip([0, *lengths], ends, strict=True))
