@@ -49,10 +49,10 @@ class SurfelSet:
     """n surfels in progressive order.
 
     position: (n, 3) metres. normal: (n, 3) unit, to the side that was seen. color: (n, 3) linear.
-    spacing: of their positions. size: (n,) 0 to 1, or (1,) for all: of the radius that discs of a
-    prefix have, with which each covers no more than what it stands for. unlit: colours are what is
-    seen; clients add no light. double_sided: seen from behind, normals turn round, as on leaves;
-    otherwise a surfel stands for what is before it, of something solid.
+    spacing: of their positions. size: (n,), or (1,) for all, 0 to 1: of the radius that discs
+    of a prefix have, with which each covers no more than what it stands for. unlit: colours are
+    what is seen; clients add no light. double_sided: seen from behind, normals turn round, as on
+    leaves; otherwise a surfel stands for what is before it, of something solid.
     """
 
     position: FloatArray
@@ -72,7 +72,7 @@ class SurfelSet:
         all_alike = np.shape(self.size) == (1,)
         size = np.repeat(self.size, len(position)) if all_alike else self.size
         size = checked("SurfelSet.size", size, (len(position),), np.float64)
-        if ((size < 0) | (size > 1)).any():
+        if not ((size >= 0) & (size <= 1)).all():
             raise ValueError("SurfelSet.size: expected 0 to 1")
         object.__setattr__(self, "size", size)
         if self.spacing.total != len(position):

@@ -38,12 +38,10 @@ def test_a_sheet_is_whole_but_at_its_edges() -> None:
     assert found[late & (edge < 0.2 * radius)].mean() < 0.1
 
 
-def test_nothing_of_a_line_or_of_scattered_points_is_inside() -> None:
-    """A line has many more points than discs of its spacing by the square root would need."""
-    random = np.random.default_rng(0)
-    line = np.outer(random.random(40_000), [1.0, 0.0, 0.0])
+def test_nothing_of_a_line_is_inside() -> None:
+    """Though it has many more points than discs of its spacing by the square root would need."""
+    line = np.outer(np.random.default_rng(0).random(40_000), [1.0, 0.0, 0.0])
     assert inside(flat(line, 2000)).max() == 0
-    assert inside(flat(random.random((40_000, 3)), 2000)).mean() < 0.4
 
 
 def test_sizes_are_tried_downwards_until_coverage_is_right() -> None:

@@ -1,7 +1,7 @@
 """Sizes of discs with which surfels cover as much of a picture as what they stand for.
 
 Brandt et al., section 6, state that thin parts come out fattened, as discs that leave no hole in a
-surface stand over its edges. Here a disc is as large as that only where the surface goes on in all
+surface stand over its edges. Here a disc is that large only where the surface goes on in all
 directions around it: the angle criterion of Bendels, Schnabel, Klein: Detecting holes in point set
 surfaces (2006). All others by which a prefix doubles are smaller by one factor, with which pictures
 have the right coverage.
@@ -34,7 +34,7 @@ TOTAL = 0.5
 
 REACH = (0.6, 1.8)
 """Of the radius of a disc: how far away what its surface goes on with is."""
-FLAT = 0.35
+FLAT = 0.5
 """Of the radius: how far off its plane that is at most."""
 NEIGHBOURS = 16
 """Points that are looked at, the nearest."""
@@ -78,7 +78,7 @@ def _sizes(
         return excess, sum(float(np.abs(part).sum()) for part in off) + TOTAL * abs(excess)
 
     share = _share(measured)
-    return share + (1 - share) * whole
+    return np.asarray(share + (1 - share) * whole)
 
 
 def _share(measured: Callable[[float], tuple[float, float]]) -> float:
@@ -114,13 +114,10 @@ def inside(surfels: SurfelSet) -> FloatArray:
     from scipy.spatial import cKDTree
 
     lengths = doublings(total, 2)
-    trees, apart = {}, {}
-    for _, length in lengths:
-        trees[length] = cKDTree(surfels.position[:length])
-        some = surfels.position[: min(length, SOME)]
-        apart[length] = float(np.median(trees[length].query(some, 2)[0][:, 1]))
+    trees = {length: cKDTree(surfels.position[:length]) for _, length in lengths}
+    apart = {length: _apart(surfels.position[:length]) for length in trees}
     for first, length in lengths:
-        radius = surfels.spacing.radius(length)
+        radius = max(surfels.spacing.radius(length), apart[length])
         # where there are more points than such discs need, as on what is thin, fewer tell as much
         enough = [n for n in trees if n <= length and apart[n] >= REACH[0] * radius]
         net = max(enough, default=2)
@@ -128,6 +125,13 @@ def inside(surfels: SurfelSet) -> FloatArray:
         index = trees[net].query(surfels.position[rows], min(NEIGHBOURS, net))[1]
         result[rows] = _inside(surfels, rows, index, radius)
     return result
+
+
+def _apart(positions: FloatArray) -> float:
+    """Median of the distances from each of some to the nearest other one, two at least."""
+    from scipy.spatial import cKDTree
+
+    return float(np.median(cKDTree(positions).query(positions[:SOME], 2)[0][:, 1]))
 
 
 def _inside(surfels: SurfelSet, rows: IntArray, index: IntArray, radius: float) -> FloatArray:
