@@ -26,12 +26,6 @@ vec3 turned_to(vec3 normal, vec3 to_viewer) {
     return turned(normal, dot(normal, to_viewer) >= 0.0);
 }
 
-// The same of a surfel of something solid, which stands for what is before it where it is seen from
-// behind: its edges go on. to_viewer: unit.
-vec3 mirrored_to(vec3 normal, vec3 to_viewer) {
-    return normal - 2.0 * min(dot(normal, to_viewer), 0.0) * to_viewer;
-}
-
 float sky_light(vec3 normal) {
     return mix(sky.y, sky.x, 0.5 + 0.5 * normal.y);
 }

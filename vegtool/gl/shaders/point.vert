@@ -17,15 +17,21 @@ uniform vec2 size;     // of the picture, pixels
 uniform vec3 paint;
 #endif
 
-flat out vec2 middle;  // pixels
-flat out vec2 nearing; // of one over the distance on the disc's plane: its part, per pixel
-flat out vec3 ellipse; // of the disc: its quadratic form, times that squared
-flat out vec3 depth;   // at the middle; of that part; most to either side
+flat out vec2 middle;   // pixels
+flat out vec2 nearing;  // of one over the distance on the disc's plane: its part, per pixel
+flat out vec3 ellipse;  // of the disc: its quadratic form, times that squared
+flat out vec3 depth;    // at the middle; of that part; most to either side
 flat out vec3 light;
 
 vec3 turned_about_y(vec3 v) {
     vec2 turn = in_turn_size.xy;
     return vec3(turn.x * v.x + turn.y * v.z, v.y, turn.x * v.z - turn.y * v.x);
+}
+
+// Of something solid. A surfel seen from behind stands for what is before it, at whose edges normals
+// go on. to_eye: unit.
+vec3 mirrored_to(vec3 normal, vec3 to_eye) {
+    return normal - 2.0 * min(dot(normal, to_eye), 0.0) * to_eye;
 }
 
 void main() {
