@@ -49,17 +49,19 @@ class SurfelSet:
     """n surfels in progressive order.
 
     position: (n, 3) metres. normal: (n, 3) unit, to the side that was seen. color: (n, 3) linear.
-    spacing: of their positions. covering: (k,) factors of the radii of discs, of prefixes of 1, 2,
-    4, ... points, with which they cover as much of a picture as the surface does; beyond, the last
-    one. unlit: colours are what is seen; clients add no light.
+    spacing: of their positions. size: (n,), or (1,) for all, 0 to 1: of the radius that discs
+    of a prefix have, with which each covers no more than what it stands for. unlit: colours are
+    what is seen; clients add no light. double_sided: seen from behind, normals turn round, as on
+    leaves; otherwise a surfel stands for what is before it, of something solid.
     """
 
     position: FloatArray
     normal: FloatArray
     color: FloatArray
     spacing: Spacing
-    covering: FloatArray = field(default_factory=lambda: np.ones(1))
+    size: FloatArray = field(default_factory=lambda: np.ones(1))
     unlit: bool = False
+    double_sided: bool = True
 
     def __post_init__(self) -> None:
         position = checked("SurfelSet.position", self.position, (None, 3), np.float64)
@@ -67,10 +69,12 @@ class SurfelSet:
         for name in ("normal", "color"):
             value = checked(f"SurfelSet.{name}", getattr(self, name), position.shape, np.float64)
             object.__setattr__(self, name, value)
-        covering = checked("SurfelSet.covering", self.covering, (None,), np.float64)
-        if not len(covering) or (covering <= 0).any():
-            raise ValueError("SurfelSet.covering: expected factors above zero, one at least")
-        object.__setattr__(self, "covering", covering)
+        all_alike = np.shape(self.size) == (1,)
+        size = np.repeat(self.size, len(position)) if all_alike else self.size
+        size = checked("SurfelSet.size", size, (len(position),), np.float64)
+        if not ((size >= 0) & (size <= 1)).all():
+            raise ValueError("SurfelSet.size: expected 0 to 1")
+        object.__setattr__(self, "size", size)
         if self.spacing.total != len(position):
             raise ValueError(
                 f"SurfelSet.spacing: expected that of {len(position)}; is of {self.spacing.total}"
@@ -95,6 +99,7 @@ class SurfelSet:
             position=self.position[rows],
             normal=self.normal[rows],
             color=self.color[rows],
+            size=self.size[rows],
             spacing=spacing,
         )
 
@@ -102,15 +107,9 @@ class SurfelSet:
         """The set elsewhere, by (3,) metres."""
         return replace(self, position=self.position + shift)
 
-    def factors(self, prefix: npt.ArrayLike) -> FloatArray:
-        """(m,) factors of the radii of discs for prefixes (m,), each one or more."""
-        step = np.log2(np.maximum(np.asarray(prefix, np.float64), 1.0))
-        return np.interp(step, np.arange(len(self.covering)), self.covering)
-
     def discs(self, radius_m: npt.ArrayLike) -> tuple[IntArray, FloatArray]:
         """(m,) int32 how many surfels to draw where discs of radii (m,), metres, are small enough,
-        and (m,) metres, the radii to draw them with: larger where there are no more surfels."""
+        and (m,) metres, the radii of those of size 1: larger where there are no more surfels."""
         radius = np.asarray(radius_m, np.float64)
-        prefix = self.spacing.prefixes(radius)
         least = self.spacing.radius(max(len(self), 1))
-        return prefix, np.maximum(radius, least) * self.factors(prefix)
+        return self.spacing.prefixes(radius), np.maximum(radius, least)

@@ -38,14 +38,15 @@ def test_what_is_written_is_read_again(
     tmp_path: Path, quantized: bool, apart: float, turned: float
 ) -> None:
     """Positions to float32, or to 16 bits of the extent; normals to a degree; colours to 16."""
-    told = replace(ball(unlit=True), covering=np.array([0.5, 0.75, 1.0]))
+    told = ball(unlit=True)
+    told = replace(told, size=np.linspace(0, 1, len(told)), double_sided=False)
     found = read_surfel_set(written(tmp_path, told, quantized))
     assert np.abs(found.position - told.position).max() < apart
     assert np.abs(found.normal - told.normal).max() < turned
     assert np.abs(found.color - told.color).max() <= 0.5 / 65535 + 1e-9
     assert found.spacing == told.spacing
-    assert found.covering.tolist() == [0.5, 0.75, 1.0]
-    assert found.unlit
+    assert np.abs(found.size - told.size).max() <= 0.5 / 255 + 1e-9
+    assert found.unlit and not found.double_sided
 
 
 def test_far_from_the_origin_nothing_is_lost(tmp_path: Path) -> None:
@@ -56,9 +57,9 @@ def test_far_from_the_origin_nothing_is_lost(tmp_path: Path) -> None:
         assert np.abs(found.position - told.position).max() < 1e-4
 
 
-def test_a_surfel_is_32_bytes_or_20(tmp_path: Path) -> None:
+def test_a_surfel_is_36_bytes_or_24(tmp_path: Path) -> None:
     """Beside what a file of any length has."""
-    for quantized, bytes_ in ((False, 32), (True, 20)):
+    for quantized, bytes_ in ((False, 36), (True, 24)):
         sizes = [written(tmp_path, ball(n), quantized).stat().st_size for n in (100, 300)]
         assert abs(sizes[1] - sizes[0] - 200 * bytes_) < 50
 
@@ -85,8 +86,7 @@ def mesh_of(document: dict[str, Any]) -> dict[str, Any]:
         lambda d: mesh_of(d).pop("extras"),
         lambda d: mesh_of(d)["extras"]["surfels"].update(p_m=0),
         lambda d: mesh_of(d)["extras"]["surfels"].update(r_m=-1.0),
-        lambda d: mesh_of(d)["extras"]["surfels"].update(covering=[]),
-        lambda d: mesh_of(d)["extras"]["surfels"].update(covering=["wide"]),
+        lambda d: mesh_of(d)["primitives"][0]["attributes"].pop("_SIZE"),
         lambda d: mesh_of(d)["primitives"][0]["attributes"].pop("NORMAL"),
         lambda d: mesh_of(d)["primitives"][0].update(material=7),
         lambda d: d["meshes"].append(mesh_of(d)) or d["nodes"].append({"mesh": 1})

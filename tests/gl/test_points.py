@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -17,20 +19,23 @@ Z = np.array([0.0, 0, 1])
 
 
 def drawn(
-    surfels: SurfelSet, radius: float, prefix: int, direction: np.ndarray = Z, turn: float = 0.0
-) -> np.ndarray:
+    surfels: SurfelSet, radius: float, prefix: int, direction: np.ndarray = Z, turn: float = 0.0,
+    samples: int = 0,
+) -> np.ndarray:  # fmt: skip
     """From ten metres away, a metre is 93.5 pixels."""
     camera = framed(np.zeros(3), 1.5, direction, 10.0, Display())
     moved = np.eye(4)
     moved[:3, 3] = camera.eye - camera.target
     shot = Shot(camera.view_projection() @ moved, camera.eye, camera.width, camera.height)
+    finer = 1 if samples else 4
     with SurfelSetBuffers(surfels) as buffers:
         rows = buffers.instances(
             camera.eye, np.zeros((1, 3)), np.array([turn]), np.ones(1), np.array([radius])
         )
         return pictured(
             buffers.ctx, shot,
-            lambda part: buffers.draw(rows, np.array([prefix]), part, Light(), footprint=4), 4, 0,
+            lambda part: buffers.draw(rows, np.array([prefix]), part, Light(), footprint=finer),
+            finer, samples,
         )  # fmt: skip
 
 
@@ -78,3 +83,41 @@ def test_discs_cut_each_other_where_their_planes_meet() -> None:
     left, right = np.array_split(picture[..., :2].sum(axis=0), 2)
     # a plane of normal (1, 0, 1) rises to the left
     assert left[:, 0].sum() > 50 * left[:, 1].sum() and right[:, 1].sum() > 50 * right[:, 0].sum()
+
+
+def test_sizes_are_shares_of_the_radius() -> None:
+    half = replace(ONE, size=np.array([0.5, 1.0]))
+    assert drawn(half, 0.2, 1)[..., 3].sum() == pytest.approx(drawn(ONE, 0.1, 1)[..., 3].sum())
+    for size in ([0.5], [1.5, 1.0], [-0.1, 1.0], [1.0, 1.0, 1.0]):
+        if len(size) == 1:
+            assert np.array_equal(replace(ONE, size=np.array(size)).size, [0.5, 0.5])
+        else:
+            with pytest.raises(ValueError, match=r"SurfelSet\.size"):
+                replace(ONE, size=np.array(size))
+
+
+def test_multisampling_sees_the_edges_of_discs() -> None:
+    """Discs of a third of a pixel's radius cover, in the mean over places, as much as their area;
+    tested at the middles of pixels alone they would cover nothing or a whole one."""
+    at = np.column_stack([np.mgrid[:20, :20].reshape(2, -1).T * 0.0537, np.zeros(400)])
+    many = SurfelSet(at, np.tile(Z, (400, 1)), np.ones((400, 3)), Spacing(1, 0.0, 400))
+    focal = Display().pixels_per_metre(10.0)
+    picture = drawn(many, 1 / (3 * focal), 400, samples=4)
+    assert picture[..., 3].sum() == pytest.approx(400 * np.pi / 9, rel=0.1)
+    assert picture[..., 3].max() < 1
+
+
+def test_what_is_solid_is_mirrored_and_leaves_turn_round() -> None:
+    """A disc seen from behind, a little: of a solid, as light as one that looks as far to the eye,
+    and to the same side."""
+    to_side, to_eye = (1 - 0.2**2) ** 0.5, 0.2
+    behind, before, turned = (
+        of(((0, 0, 0), normal), ((1, 0, 0), normal))
+        for normal in ((to_side, 0, -to_eye), (to_side, 0, to_eye), (-to_side, 0, to_eye))
+    )
+    solid, leaf, first, second = (
+        drawn(surfels, 0.2, 1)[..., :3].max()
+        for surfels in (replace(behind, double_sided=False), behind, before, turned)
+    )
+    assert solid == pytest.approx(first, rel=0.01) and leaf == pytest.approx(second, rel=0.01)
+    assert abs(first - second) > 0.1 * first

@@ -2,8 +2,8 @@
 
 Sources: glTF 2.0 specification, 3.7.2 (points); KHR_mesh_quantization (extension, Khronos glTF
 repository). What the length of that part follows from, and what it cannot know otherwise, is in the
-mesh's extras, as `surfels`: p_m and r_m of Brandt et al. 2019, section 4.1, and the factors of the
-radii of discs that cover as much as the surface does (SurfelSet.covering).
+mesh's extras, as `surfels`: p_m and r_m of Brandt et al. 2019, section 4.1. How large the disc of
+each is, of the radius of all, is in the attribute _SIZE (SurfelSet.size).
 """
 
 from __future__ import annotations
@@ -37,12 +37,13 @@ def add_surfels(
     """Add surfels to a document, positions relative to an origin (3,); return their node.
 
     quantized: positions in 16 bits and normals in 8, for clients that know KHR_mesh_quantization:
-    20 bytes each in place of 32.
+    24 bytes each in place of 36.
     """
     placed: dict[str, Any] = {}
     local = surfels.position - origin
     normal = unit(surfels.normal)
     color = np.round(np.clip(surfels.color, 0.0, 1.0) * STEPS).astype(np.uint16)
+    size = np.round(surfels.size * 255).astype(np.uint8)
     if quantized:
         document.use_extension(QUANTIZATION, required=True)
         low = local.min(axis=0)
@@ -69,13 +70,13 @@ def add_surfels(
             "POSITION": position,
             "NORMAL": normals,
             "COLOR_0": document.add_accessor(color, normalized=True),
+            "_SIZE": document.add_accessor(size, normalized=True),
         },
-        "material": document.add("materials", **material),
+        "material": document.add("materials", **material, doubleSided=surfels.double_sided),
     }
     told = {
         "p_m": surfels.spacing.length,
         "r_m": surfels.spacing.radius_m,
-        "covering": [float(f"{factor:.6g}") for factor in surfels.covering],
     }
     mesh = document.add("meshes", name=name, primitives=[primitive], extras={EXTRAS: told})
     return document.add("nodes", name=name, mesh=mesh, **placed)
@@ -104,7 +105,7 @@ def _read(file: GltfFile) -> SurfelSet:
     (primitive,), told = meshes[0]["primitives"], meshes[0]["extras"][EXTRAS]
     values = {
         name: np.asarray(file.accessor(primitive["attributes"][name]), np.float64)
-        for name in ("POSITION", "NORMAL", "COLOR_0")
+        for name in ("POSITION", "NORMAL", "COLOR_0", "_SIZE")
     }
     if not all(usable_rows(rows).all() for rows in values.values()) or not len(values["POSITION"]):
         raise file.broken("numbers for each surfel", "NaN, infinite ones or none")
@@ -118,6 +119,7 @@ def _read(file: GltfFile) -> SurfelSet:
         unit(values["NORMAL"]),
         values["COLOR_0"][:, :3],
         Spacing(length, radius, len(values["POSITION"])),
-        np.array(told["covering"], np.float64),
+        values["_SIZE"][:, 0],
         UNLIT in material.get("extensions", {}),
+        bool(material.get("doubleSided", False)),
     )

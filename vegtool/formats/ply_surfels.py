@@ -11,14 +11,15 @@ from vegtool.srgb import srgb_from_linear
 from vegtool.surfel_set import SurfelSet
 
 ROW = np.dtype(
-    [(name, "<f4") for name in ("x", "y", "z", "nx", "ny", "nz")]
+    [(name, "<f4") for name in ("x", "y", "z", "nx", "ny", "nz", "size")]
     + [(name, "u1") for name in ("red", "green", "blue")]
 )
 TYPES = {"<f4": "float", "|u1": "uchar"}
 
 
 def ply_bytes(surfels: SurfelSet) -> bytes:
-    """A binary file, little endian: positions in metres, y up; normals; colours in sRGB."""
+    """A binary file, little endian: positions in metres, y up; normals; sizes of the
+    discs, of the radius of all; colours in sRGB."""
     rows = np.empty(len(surfels), ROW)
     color = np.round(255 * srgb_from_linear(np.clip(surfels.color, 0.0, 1.0))).astype(np.uint8)
     for names, values in (
@@ -28,6 +29,7 @@ def ply_bytes(surfels: SurfelSet) -> bytes:
     ):
         for name, column in zip(names, values.T, strict=True):
             rows[name] = column
+    rows["size"] = surfels.size
     head = [
         "ply",
         "format binary_little_endian 1.0",

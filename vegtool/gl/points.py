@@ -25,6 +25,8 @@ sine of the turn about y, radius of the discs in that unit, factor of the width.
 linear factors of 0 to 2."""
 AS_IT_IS = (127, 127, 127, 255)
 """A tint, nearly."""
+PER_SURFEL = (("in_position", 3), ("in_normal", 3), ("in_color", 3), ("in_size", 1))
+"""Attributes: name and floats."""
 PER_INSTANCE = (("in_place", "4f", 0), ("in_turn_size", "4f", 16), ("in_tint", "4f1", 32))
 """Attributes: name, format and offset."""
 
@@ -39,8 +41,8 @@ class SurfelSetBuffers(OnGpu):
         self.center = (low + high) / 2
         self.unit = float(np.linalg.norm(high - low) / 2) or 1.0
         local = (surfels.position - self.center) / self.unit
-        rows = np.concatenate([local, surfels.normal, surfels.color], axis=1).astype(np.float32)
-        self._vertices = self.ctx.buffer(np.ascontiguousarray(rows))
+        rows = np.column_stack([local, surfels.normal, surfels.color, surfels.size])
+        self._vertices = self.ctx.buffer(rows.astype(np.float32).tobytes())
         self._rows = self.ctx.buffer(reserve=POINT_INSTANCE.itemsize, dynamic=True)
         self._arrays: dict[moderngl.Program, moderngl.VertexArray] = {}
         self._pace = Pace(self.ctx)
@@ -60,8 +62,8 @@ class SurfelSetBuffers(OnGpu):
         """(n,) POINT_INSTANCE: surfels at so many places, as an eye (3,) sees them.
 
         foot: (n, 3) metres, of their origin. turn: (n,) radians about y. scale: (n,). radius: (n,)
-        metres of the discs, before scaling. width: (n,) factors of what is not height, or None for
-        1. tint: (n, 4) as of POINT_INSTANCE, or None for what changes nothing.
+        metres of the discs of size 1, before scaling. width: (n,) factors of what is not height, or
+        None for 1. tint: (n, 4) as of POINT_INSTANCE, or None for what changes nothing.
         """
         cosine, sine = np.cos(turn), np.sin(turn)
         wide = np.ones(len(foot)) if width is None else width
@@ -101,17 +103,22 @@ class SurfelSetBuffers(OnGpu):
         are alike to a power of two are one call, and have as many as the longest.
         """
         defines = {
-            "UNLIT": self.surfels.unlit, "PAINTED": view == "painted",
+            "UNLIT": self.surfels.unlit, "DOUBLE_SIDED": self.surfels.double_sided,
+            "PAINTED": view == "painted",
+            "SOFT_EDGES": self.ctx.fbo.samples > 0,
             f"OVERDRAW {OVERDRAW_STEP}": view == "overdraw",
         }  # fmt: skip
         told = [name for name, wanted in defines.items() if wanted]
         shader = program(self.ctx, "point.vert", "point.frag", *told)
         matrix = shot.view_projection
         shader["view_projection"] = tuple(matrix.T.ravel())
+        size = footprint * shot.width, footprint * shot.height
+        across = matrix[:2, :3] - np.outer(matrix[:2, :3] @ matrix[3, :3], matrix[3, :3])
+        pixel = across * (2 / np.array(size) / (across**2).sum(axis=1))[:, None]
         for name, value in (
-            ("unprojection", tuple(np.linalg.inv(matrix).T.ravel())),
-            ("size", (footprint * shot.width, footprint * shot.height)),
-            ("focal", footprint * float(np.linalg.norm(matrix[0, :3])) * shot.width / 2),
+            ("right", tuple(pixel[0])),
+            ("up", tuple(pixel[1])),
+            ("size", size),
         ):
             if name in shader:
                 shader[name] = value
@@ -138,8 +145,13 @@ class SurfelSetBuffers(OnGpu):
     def _array(self, shader: moderngl.Program, first: int) -> moderngl.VertexArray:
         if shader not in self._arrays:
             layout, names = [], []
-            for name in ("in_position", "in_normal", "in_color"):
-                layout.append("3f" if name in shader else "12x")
+            for name, many in (
+                ("in_position", 3),
+                ("in_normal", 3),
+                ("in_color", 3),
+                ("in_size", 1),
+            ):
+                layout.append(f"{many}f" if name in shader else f"{4 * many}x")
                 names += [name] if name in shader else []
             content = [(self._vertices, " ".join(layout), *names)]
             self._arrays[shader] = self.ctx.vertex_array(shader, content)

@@ -124,23 +124,37 @@ def live_surfels(
 ) -> Picture:
     """What our own viewer shows of surfels: discs of a diameter, in pixels, where there are as many
     as that takes; 4x multisampling."""
-    shot, render = _rendering(buffers, camera, light or Light(), size_px)
+    return live_prefix(buffers, camera, *_discs(buffers, camera, size_px), light)
+
+
+def live_prefix(
+    buffers: SurfelSetBuffers, camera: Camera, prefix: int, radius_m: float,
+    light: Light | None = None,
+) -> Picture:  # fmt: skip
+    """The same of so many surfels, for discs of a radius, metres."""
+    shot, render = _rendering(buffers, camera, prefix, radius_m, light or Light())
     return pictured(buffers.ctx, shot, render, 1, MSAA)
 
 
+def _discs(buffers: SurfelSetBuffers, camera: Camera, size_px: float = 1.0) -> tuple[int, float]:
+    """How many surfels a camera is to see, and the radius of their discs, metres."""
+    one = np.ones(1)
+    pixel = buffers.pixels(camera.eye, np.zeros((1, 3)), 0 * one, one, camera.focal_px)
+    prefix, radius = buffers.surfels.discs(size_px * pixel / 2)
+    return int(prefix[0]), float(radius[0])
+
+
 def _rendering(
-    buffers: SurfelSetBuffers, camera: Camera, light: Light, size_px: float = 1.0
+    buffers: SurfelSetBuffers, camera: Camera, prefix: int, radius_m: float, light: Light
 ) -> tuple[Shot, Callable[[Shot], None]]:
     """A camera as a shot whose target is the eye, and what draws surfels into parts of it."""
-    shot, one, eye, foot = shot_of(camera), np.ones(1), camera.eye, np.zeros((1, 3))
-    pixel = buffers.pixels(eye, foot, 0 * one, one, camera.focal_px)
-    prefix, radius = buffers.surfels.discs(size_px * pixel / 2)
-    rows = buffers.instances(eye, foot, 0 * one, one, radius)
+    shot, one, eye = shot_of(camera), np.ones(1), camera.eye
+    rows = buffers.instances(eye, np.zeros((1, 3)), 0 * one, one, radius_m * one)
     moved = np.eye(4)
     moved[:3, 3] = eye - camera.target
 
     def render(part: Shot) -> None:
-        buffers.draw(rows, prefix, part, light)
+        buffers.draw(rows, np.array([prefix]), part, light)
 
     return Shot(shot.view_projection @ moved, eye, shot.width, shot.height), render
 
@@ -148,7 +162,9 @@ def _rendering(
 def fragments(buffers: Uploaded, camera: Camera) -> int:
     """Fragments that a client shades where nothing hides anything: overdraw, alpha or not."""
     if isinstance(buffers, SurfelSetBuffers):
-        return count_rendered(buffers.ctx, *_rendering(buffers, camera, Light()))
+        return count_rendered(
+            buffers.ctx, *_rendering(buffers, camera, *_discs(buffers, camera), Light())
+        )
     return count_fragments(buffers, shot_of(camera))
 
 
@@ -161,7 +177,7 @@ def frame_seconds(
     """
     light = light or Light()
     if isinstance(buffers, SurfelSetBuffers):
-        shot, render = _rendering(buffers, camera, light)
+        shot, render = _rendering(buffers, camera, *_discs(buffers, camera), light)
         ctx = buffers.ctx
         return time_rendered(
             ctx, shot, lambda part: drawn_part(ctx, part, render, 1, MSAA), repeats

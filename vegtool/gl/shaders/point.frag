@@ -1,26 +1,31 @@
 // A surfel: what lies on its plane within its radius, as far away as that is.
-flat in vec3 center;
-flat in vec3 normal;
-flat in float radius;
+#ifdef SOFT_EDGES
+#include "soft_edges.glsl"
+#endif
+flat in vec2 middle;
+flat in vec2 nearing;
+flat in vec3 ellipse;
+flat in vec3 depth;
 flat in vec3 light;
-
-uniform mat4 view_projection;
-uniform mat4 unprojection;  // its inverse
-uniform vec2 size;          // of the picture, pixels
 
 out vec4 fragment;
 
+bool within(vec2 at) {
+    float part = 1.0 + dot(nearing, at);
+    return part > 0.0 && dot(ellipse, vec3(at.x * at.x, at.x * at.y, at.y * at.y)) <= part * part;
+}
+
 void main() {
-    vec2 at = 2.0 * gl_FragCoord.xy / size - 1.0;
-    vec4 beyond = unprojection * vec4(at, 1.0, 1.0);
-    vec3 ray = beyond.xyz / beyond.w;  // from the eye, which is at zero
-    float across = dot(ray, normal);
-    if (across > -1e-6 * length(ray)) discard;
-    vec3 place = ray * (dot(center, normal) / across);
-    vec3 off = place - center;
-    if (dot(off, off) > radius * radius) discard;
-    vec4 clip = view_projection * vec4(place, 1.0);
-    gl_FragDepth = 0.5 + 0.5 * clip.z / clip.w;
+    vec2 at = gl_FragCoord.xy - middle;
+#ifdef SOFT_EDGES
+    for (int i = 0; i < 4; ++i) {
+        if (!within(at + SAMPLES[i])) samples_shown &= ~(1 << i);
+    }
+    show_samples();
+#else
+    if (!within(at)) discard;
+#endif
+    gl_FragDepth = depth.x + depth.y * clamp(dot(nearing, at), -depth.z, depth.z);
 #ifdef OVERDRAW
     fragment = vec4(vec3(OVERDRAW), 1.0);
 #else

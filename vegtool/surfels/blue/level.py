@@ -18,7 +18,7 @@ from vegtool.lod import Display, Level
 from vegtool.progress import Progress, silent
 from vegtool.surfel_set import SurfelSet
 from vegtool.surfels.blue.candidates import RESOLUTION, candidates
-from vegtool.surfels.blue.make import ordered
+from vegtool.surfels.blue.make import ORDERED, SEEN, ordered, sized
 from vegtool.timing import timed
 
 PLACES = 20_000
@@ -51,10 +51,19 @@ def sampled(
     """At most `count` surfels of a plant. buffers: without mipmaps. lit: light that goes into their
     colours. Raises CapabilityError where nothing can draw."""
     seconds: dict[str, float] = {}
+    materials = buffers.plant.materials
     with timed(seconds, "candidates"):
-        found = candidates(buffers, resolution_for(count), progress)
+        found = candidates(
+            buffers, resolution_for(count), lambda stage, f: progress(stage, SEEN * f)
+        )
     with timed(seconds, "order"):
-        surfels = ordered(found, count, seed=seed, unlit=lit is not None)
+        surfels = ordered(
+            found, count, seed=seed, unlit=lit is not None,
+            double_sided=any(material.double_sided for material in materials),
+        )  # fmt: skip
+    progress("sizes", ORDERED)
+    with timed(seconds, "sizes"):
+        surfels = sized(surfels, buffers)
     step = max(len(found) // PLACES, 1)
     return Sampled(surfels, found.position[::step], seconds)
 

@@ -6,19 +6,30 @@ progressive blue surfels (2019), section 3.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from vegtool.arrays import unit
+from vegtool.arrays import Picture, unit
 from vegtool.gl.upload import PlantBuffers
+from vegtool.measure.pictures import truth
+from vegtool.measure.views import Camera
 from vegtool.progress import Progress, silent
 from vegtool.surfel_set import SurfelSet
 from vegtool.surfels.blue.averaged import averaged
 from vegtool.surfels.blue.candidates import RESOLUTION, Candidates, candidates
+from vegtool.surfels.blue.covering import sizes
 from vegtool.surfels.blue.distances import spacing
 from vegtool.surfels.blue.farthest import farthest_order
 
-SEEN = 0.7
-"""Share of the progress that goes into candidates."""
+NORMALS = 2.0
+"""What a unit of difference of normals counts as where values are means, in distances between
+points: opposite sides, and leaves that cross, are not mixed."""
+SUPERSAMPLE = 4
+"""Samples per axis and pixel of what coverage is compared with."""
+SEEN = 0.4
+ORDERED = 0.6
+"""Shares of the progress that candidates and their order are done at."""
 
 
 def surfels_of(
@@ -36,17 +47,35 @@ def surfels_of(
     """
     found = candidates(buffers, resolution, lambda stage, f: progress(stage, SEEN * f))
     progress("order", SEEN)
-    unlit = all(material.unlit for material in buffers.plant.materials)
-    return ordered(found, count, seed=seed, unlit=unlit)
+    materials = buffers.plant.materials
+    surfels = ordered(
+        found, count, seed=seed, unlit=all(material.unlit for material in materials),
+        double_sided=any(material.double_sided for material in materials),
+    )  # fmt: skip
+    progress("sizes", ORDERED)
+    return sized(surfels, buffers)
 
 
-def ordered(found: Candidates, count: int, *, seed: int = 0, unlit: bool = False) -> SurfelSet:
-    """The same of candidates."""
+def sized(surfels: SurfelSet, buffers: PlantBuffers) -> SurfelSet:
+    """Surfels of a plant with the sizes that cover as much as it does."""
+
+    def seen(camera: Camera) -> Picture:
+        return truth(buffers, camera, supersample=SUPERSAMPLE)
+
+    return replace(surfels, size=sizes(surfels, seen))
+
+
+def ordered(
+    found: Candidates, count: int, *, seed: int = 0, unlit: bool = False, double_sided: bool = True
+) -> SurfelSet:
+    """The same of candidates, all of size 1."""
     order = farthest_order(found.position, count, seed=seed)
     values = np.hstack([found.color, found.normal])
-    mean = averaged(found.position, values, order)
+    mean = averaged(found.position, values, order, normals=found.normal, normal_weight=NORMALS)
     normal = unit(mean[:, 3:])
     flat = (normal == 0).all(axis=1)  # of opposite sides alike
     normal[flat] = found.normal[order][flat]
     position = found.position[order]
-    return SurfelSet(position, normal, mean[:, :3], spacing(position), unlit=unlit)
+    return SurfelSet(
+        position, normal, mean[:, :3], spacing(position), unlit=unlit, double_sided=double_sided
+    )
