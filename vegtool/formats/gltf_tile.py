@@ -1,5 +1,5 @@
 """Tiles as .glb files: of a landscape, merged groups, instances of models that tiles share, and
-squares that were clustered anew; of one plant, parts of its billboards and of its surface.
+squares that were clustered anew or are surfels; of one plant, parts of its billboards and of its surface.
 
 Sources: glTF 2.0 specification; KHR_mesh_quantization and EXT_mesh_gpu_instancing (extensions,
 Khronos glTF repository). Textures of merged groups, and the vertices of instanced models, are files
@@ -21,6 +21,7 @@ from vegtool.formats import png
 from vegtool.formats.glb import ELEMENT_ARRAY_BUFFER, Document
 from vegtool.formats.gltf import ALPHA_CUTOFF, plant_document
 from vegtool.formats.gltf_material import UNLIT
+from vegtool.formats.gltf_surfels import add_surfels
 from vegtool.formats.plant_table import (
     PlantTable,
     add_tables,
@@ -31,6 +32,7 @@ from vegtool.formats.plant_table import (
 from vegtool.formats.shared_model import SharedModel
 from vegtool.lod import Triangles
 from vegtool.plant import Plant
+from vegtool.surfel_set import SurfelSet
 
 QUANTIZATION, INSTANCING = "KHR_mesh_quantization", "EXT_mesh_gpu_instancing"
 STEPS = 65535
@@ -163,6 +165,14 @@ def part_glb(
         if quads is None:
             raise ValueError("part_glb: expected quads or a mesh")
         return _shown(document, primitives[0], name, {})
+    return document.glb()
+
+
+def surfels_glb(surfels: SurfelSet, name: str, plain: bool = False) -> bytes:
+    """A square's surfels, whose positions are in metres from its centre, in progressive order: one
+    node, one mesh, one primitive of points. plain: float32 in place of KHR_mesh_quantization."""
+    document = Document()
+    document.show(add_surfels(document, surfels, name, np.zeros(3), not plain))
     return document.glb()
 
 

@@ -1,0 +1,122 @@
+"""Surfels of a group of things, out of the surfels of each.
+
+Brandt, Jähn, Fischer, Meyer auf der Heide: Rendering of complex heterogenous scenes using
+progressive blue surfels (2019), section 3.4: bottom-up, from children's surfels in place of
+geometry. What is seen of them from the eight corners of the group's bounds, as in section 3.1, are
+the candidates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+import numpy.typing as npt
+
+from vegtool.arrays import FloatArray, checked
+from vegtool.gl.point_ids import seen_discs
+from vegtool.measure.views import upright
+from vegtool.surfel_set import SurfelSet
+from vegtool.surfels.blue.candidates import Candidates
+from vegtool.surfels.blue.make import ordered
+
+FLATTEST = 0.5
+"""Of the longest side of the bounds, which none counts as less than: flat groups, as squares of a
+landscape are, are looked at from 19 degrees above their border at least."""
+PIXELS_OF_ROOT = 2.0
+"""Along a side of the picture, for the root of the number of discs."""
+RESOLUTION = (64, 2048)
+"""Pixels along a side, at least and at most."""
+PLACES = 20_000
+"""Candidates at most, at which the error is looked at."""
+FAR = 0.95
+"""Share of them that are no farther from a surfel than is said."""
+
+
+@dataclass(frozen=True, eq=False)
+class Discs:
+    """n surfels that cover what they are of. position: (n, 3) metres. normal: (n, 3) unit. color:
+    (n, 3) linear. radius: (n,) metres."""
+
+    position: FloatArray
+    normal: FloatArray
+    color: FloatArray
+    radius: FloatArray
+
+    def __post_init__(self) -> None:
+        position = checked("Discs.position", self.position, (None, 3), np.float64)
+        object.__setattr__(self, "position", position)
+        for name, shape in (("normal", (len(position), 3)), ("color", (len(position), 3)),
+                            ("radius", (len(position),))):  # fmt: skip
+            value = checked(f"Discs.{name}", getattr(self, name), shape, np.float64)
+            object.__setattr__(self, name, value)
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+    def of(self, rows: npt.NDArray[np.bool_]) -> Discs:
+        """Some of them."""
+        return Discs(self.position[rows], self.normal[rows], self.color[rows], self.radius[rows])
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """surfels: of a group. candidates: of how many. error_m: metres, no more than which FAR of them
+    are from the nearest surfel."""
+
+    surfels: SurfelSet
+    candidates: int
+    error_m: float
+
+
+def discs_of(surfels: SurfelSet) -> Discs:
+    """All of a set, as large as they are drawn where there are no more."""
+    _, radius = surfels.discs(np.zeros(1))
+    return Discs(
+        surfels.position, surfels.normal, surfels.color, np.full(len(surfels), radius[0])
+    )
+
+
+def together(some: Sequence[Discs]) -> Discs:
+    """All discs of several, one at least, in order."""
+    return Discs(
+        *(np.concatenate([getattr(one, name) for one in some])
+          for name in ("position", "normal", "color", "radius"))
+    )  # fmt: skip
+
+
+def outside(discs: Discs) -> npt.NDArray[np.bool_]:
+    """(n,) which discs are seen from outside: from a corner of their bounds. One at least is.
+
+    Raises CapabilityError where nothing can draw.
+    """
+    if not len(discs):
+        return np.zeros(0, np.bool_)
+    half = np.ptp(discs.position, axis=0) / 2
+    half = np.maximum(half, FLATTEST * (float(half.max()) or 1.0))
+    corners = np.array(list(product((-1.0, 1.0), repeat=3))) * half / np.linalg.norm(half)
+    axes = np.array([np.stack([*upright(corner), corner]) for corner in corners])
+    resolution = int(np.clip(PIXELS_OF_ROOT * len(discs) ** 0.5, *RESOLUTION))
+    return seen_discs(discs.position, discs.normal, discs.radius, axes, resolution)
+
+
+def grouped(discs: Discs, count: int, *, seed: int = 0, unlit: bool = False) -> Group:
+    """At most `count` surfels of a group, of which there is a disc at least; no more than are seen.
+
+    Raises UsageError for a negative count, CapabilityError where nothing can draw.
+    """
+    from scipy.spatial import cKDTree
+
+    seen = discs.of(outside(discs))
+    found = Candidates(
+        seen.position, seen.normal, seen.color, np.zeros(len(seen), np.int32),
+        float(seen.radius.max()),
+    )  # fmt: skip
+    surfels = ordered(found, count, seed=seed, unlit=unlit)
+    error = 0.0
+    if len(surfels) < len(seen):
+        some = seen.position[:: max(len(seen) // PLACES, 1)]
+        error = float(np.quantile(cKDTree(surfels.position).query(some)[0], FAR))
+    return Group(surfels, len(seen), error)
