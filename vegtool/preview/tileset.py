@@ -22,9 +22,11 @@ from vegtool.errors import InputError
 from vegtool.formats import read_plant
 from vegtool.formats.beside import find_beside
 from vegtool.formats.gltf_data import GltfFile, open_gltf
+from vegtool.formats.gltf_surfels import read_surfel_set
 from vegtool.formats.gltf_tile import INSTANCING
 from vegtool.formats.tileset import CLIENT_PX, TILESET
 from vegtool.plant import Plant
+from vegtool.surfel_set import SurfelSet
 
 LongArray = npt.NDArray[np.int64]
 
@@ -46,7 +48,8 @@ class Tileset:
     origin: (t, 3) metres. low, high: (t, 3) metres, of their boxes. error_m: (t,). children: (t, 2)
     int64, the first of each, and the one after the last. plants: (t,) int64, that stand on each.
     feet_m: (t, 2), the lowest and highest of their feet. depth: (t,) int64, of each below the root.
-    seen_px: pixels that errors are to be seen as.
+    surfels: (t,) int64, that each is drawn as, 0 of others. seen_px: pixels that errors are to be
+    seen as.
     """
 
     file: tuple[str | None, ...]  # half a million paths would take seconds
@@ -58,6 +61,7 @@ class Tileset:
     plants: LongArray
     feet_m: FloatArray
     depth: LongArray
+    surfels: LongArray
     seen_px: float = CLIENT_PX
 
     @cached_property
@@ -157,6 +161,7 @@ class _Part:
     plants: LongArray
     feet_m: FloatArray
     depth: LongArray
+    surfels: LongArray
     outside: list[_Outside]
     end: int
     seen_px: float
@@ -225,6 +230,7 @@ def _tiles_of(at: _Outside, root: dict[str, Any], free: int) -> _Part:
         np.array([tile["extras"]["plants"] for tile, _, _ in shown], np.int64),
         _numbers([tile["extras"]["feet_m"] for tile, _, _ in shown], 2),
         numbers[:, 1],
+        np.array([tile["extras"].get("surfels", 0) for tile, _, _ in shown], np.int64),
         outside,
         free,
         seen_px,
@@ -267,6 +273,7 @@ def _joined(parts: Sequence[_Part]) -> Tileset:
         joined("plants"),
         joined("feet_m"),
         joined("depth"),
+        joined("surfels"),
         parts[0].seen_px,
     )
 
@@ -307,6 +314,17 @@ def read_tile(path: Path, model: Callable[[Path], Plant]) -> list[Copies]:
     except BROKEN as error:
         raise InputError(
             f"{path}: expected a tile as vegtool tiles writes it ({error!r}). Make it again"
+        ) from error
+
+
+def read_surfels(path: Path) -> SurfelSet:
+    """What a tile of surfels draws, from the tile's origin. Raises InputError for what is missing
+    or broken."""
+    try:
+        return read_surfel_set(path)
+    except OSError as error:
+        raise InputError(
+            f"{path}: cannot be read ({error.strerror}). Make the tiles again"
         ) from error
 
 
