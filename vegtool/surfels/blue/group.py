@@ -15,20 +15,23 @@ from itertools import product
 import numpy as np
 import numpy.typing as npt
 
-from vegtool.arrays import FloatArray, checked
+from vegtool.arrays import FloatArray, IntArray, checked, unit
 from vegtool.gl.point_ids import seen_discs
 from vegtool.measure.views import upright
 from vegtool.surfel_set import SurfelSet
-from vegtool.surfels.blue.candidates import Candidates
-from vegtool.surfels.blue.make import ordered
+from vegtool.surfels.blue.distances import spacing
+from vegtool.surfels.blue.farthest import farthest_order
+from vegtool.surfels.blue.places import drawn
 
 FLATTEST = 0.5
 """Of the longest side of the bounds, which none counts as less than: flat groups, as squares of a
 landscape are, are looked at from 19 degrees above their border at least."""
-PIXELS_OF_ROOT = 2.0
+PIXELS_OF_ROOT = 1.4
 """Along a side of the picture, for the root of the number of discs."""
 RESOLUTION = (64, 2048)
 """Pixels along a side, at least and at most."""
+MEANT = 8
+"""Discs for each surfel, of which its colour and its normal are means."""
 PLACES = 20_000
 """Candidates at most, at which the error is looked at."""
 FAR = 0.95
@@ -110,13 +113,38 @@ def grouped(discs: Discs, count: int, *, seed: int = 0, unlit: bool = False) -> 
     from scipy.spatial import cKDTree
 
     seen = discs.of(outside(discs))
-    found = Candidates(
-        seen.position, seen.normal, seen.color, np.zeros(len(seen), np.int32),
-        float(seen.radius.max()),
-    )  # fmt: skip
-    surfels = ordered(found, count, seed=seed, unlit=unlit)
+    order = farthest_order(seen.position, count, seed=seed)
+    color, normal = _means(seen, order)
+    position = seen.position[order]
+    surfels = SurfelSet(position, normal, color, spacing(position), unlit=unlit)
     error = 0.0
     if len(surfels) < len(seen):
         some = seen.position[:: max(len(seen) // PLACES, 1)]
         error = float(np.quantile(cKDTree(surfels.position).query(some)[0], FAR))
     return Group(surfels, len(seen), error)
+
+
+def _means(seen: Discs, order: IntArray) -> tuple[FloatArray, FloatArray]:
+    """(k, 3) colours and (k, 3) unit normals of those in order: as of averaged.py, but of prefixes
+    of all lengths, as from afar a surfel stands for many leaves, each with a light of its own. What
+    is larger counts for more."""
+    from scipy.spatial import cKDTree
+
+    area = np.maximum(seen.radius, 1e-9 * float(seen.radius.max()) or 1.0)[:, None] ** 2
+    values = np.hstack([seen.color, seen.normal])
+    result, weighed = values[order], np.hstack([values * area, area])
+    length = 1 << (len(order) - 1).bit_length() if len(order) else 0
+    while length > 0:  # the longest first, as the shortest is to count
+        prefix = order[:length]
+        some = drawn(len(seen), min(MEANT * length, len(seen)), length)
+        of = cKDTree(seen.position[prefix]).query(seen.position[some])[1]
+        sums = np.stack(
+            [np.bincount(of, column, len(prefix)) for column in weighed[some].T], axis=1
+        )
+        meant = sums[:, -1] > 0
+        result[: len(prefix)][meant] = sums[meant, :-1] / sums[meant, -1:]
+        length //= 2
+    normal = unit(result[:, 3:])
+    flat = (normal == 0).all(axis=1)  # of opposite sides alike
+    normal[flat] = seen.normal[order][flat]
+    return result[:, :3], normal
