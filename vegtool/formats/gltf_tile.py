@@ -1,5 +1,6 @@
 """Tiles as .glb files: of a landscape, merged groups, instances of models that tiles share, and
-squares that were clustered anew or are surfels; of one plant, parts of its billboards and of its surface.
+squares that were clustered anew or are surfels; of one plant, parts of its billboards and of its
+surface.
 
 Sources: glTF 2.0 specification; KHR_mesh_quantization and EXT_mesh_gpu_instancing (extensions,
 Khronos glTF repository). Textures of merged groups, and the vertices of instanced models, are files

@@ -32,8 +32,8 @@ told otherwise."""
 class TileEntry:
     """uri: of its file, or None of a tile without content. origin: (3,) metres in the scene's
     frame, y up. bounds: (2, 3) metres there, least and greatest corner, which hold the children's.
-    error_m: geometric error. plants: on it. feet_m: lowest and highest of where they stand. surfels: that it is drawn
-    as, if it is."""
+    error_m: geometric error. plants: on it. feet_m: lowest and highest of where they stand.
+    surfels: that it is drawn as, 0 where it is drawn as anything else."""
 
     uri: str | None
     origin: FloatArray

@@ -1,7 +1,8 @@
 """What is made of plants once, and kept in the library under a hash of all that it is made from.
 
 LIBRARY/.vegtool/HASH/ holds a chain of levels as `write_chain` writes it, or surfels (samples.py),
-whole, or is not there: it is filled under another name first. Whoever comes second leaves what the first one made.
+whole, or is not there: it is filled under another name first. Whoever comes second leaves what the
+first one made.
 """
 
 from __future__ import annotations

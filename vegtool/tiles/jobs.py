@@ -325,9 +325,7 @@ def _sampled(world: World, job: Job, node: Node, stand: Stand) -> Made:
     return _written(world, plants_tile(pyramid, world.shared, node, every, own), key)
 
 
-def _of_quarters(
-    world: World, job: FarJob, quarters: Sequence[tuple[Node, Entry]]
-) -> Made:
+def _of_quarters(world: World, job: FarJob, quarters: Sequence[tuple[Node, Entry]]) -> Made:
     """Surfels of what its quarters' files hold."""
     from vegtool.tiles.surfel_squares import quarters_tile
 

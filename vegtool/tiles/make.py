@@ -32,10 +32,10 @@ SEEN_FROM = 0.25
 @dataclass(frozen=True, eq=False)
 class Tile:
     """data: of its .glb file. plants: on the square. triangles, draws: what a client draws. kind:
-    how it was made. surfels: points in it. full: triangles of its plants in full, where surfels stand
-    for them. error_m: how far from its place anything is drawn, for 95 % of it; None where
+    how it was made. error_m: how far from its place anything is drawn, for 95 % of it; None where
     that was not measured. bounds: (2, 3) metres in the scene's frame, where what is drawn may reach
-    beyond the plants. seconds: by step."""
+    beyond the plants. surfels: points that it is drawn as. full: triangles of the plants that these
+    stand for, in full. seconds: by step."""
 
     node: Node
     data: bytes

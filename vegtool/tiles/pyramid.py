@@ -152,8 +152,8 @@ class Pyramid:
     @cached_property
     def reach_m(self) -> FloatArray:
         """(s,) metres to a side of its foot that no plant of each species reaches beyond."""
-        aside = [np.hypot(*np.abs(one.bounds[:, :, [0, 2]]).max(axis=(0, 1))) for one in self.species]
-        return np.asarray(self.largest * np.array(aside))
+        aside = [np.abs(one.bounds[:, :, [0, 2]]).max(axis=(0, 1)) for one in self.species]
+        return np.asarray(self.largest * np.hypot(*np.array(aside).T))
 
     @cached_property
     def _around(self) -> FloatArray:

@@ -115,5 +115,6 @@ def _of_faces(plant: Plant) -> SurfelSet:
     faces = plant.faces[:COUNT]
     middle: FloatArray = plant.positions[faces].mean(axis=1)
     normal = np.tile([0.0, 1.0, 0.0], (len(faces), 1))
-    color = np.array([one.base_color[:3] for one in plant.materials])[plant.face_material[: len(faces)]]
+    colors = np.array([one.base_color[:3] for one in plant.materials])
+    color = colors[plant.face_material[: len(faces)]]
     return SurfelSet(middle, normal, color, Spacing(1, 0.0, len(faces)))

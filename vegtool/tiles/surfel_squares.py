@@ -35,6 +35,9 @@ CANDIDATES = 5
 """For each surfel of a square, of its plants, at most: what is seen of them, mostly a third, is
 still more than there are surfels."""
 
+LEAST = 1e-9
+"""Scale of a plant: none counts as less."""
+
 Bools = npt.NDArray[np.bool_]
 
 
@@ -47,7 +50,8 @@ def standing(pyramid: Pyramid, node: Node, stand: Stand) -> Stand:
     reach = float(pyramid.reach_m[long].max())
     half, middle = tree.side(node.level) / 2, tree.middle(node)
     low, high = tiles.low[:, [0, 2]], tiles.high[:, [0, 2]]
-    near = ((low <= middle + half + reach) & (high >= middle - half - reach)).all(axis=1)
+    within = (low <= middle + half + reach) & (high >= middle - half - reach)
+    near: np.ndarray = np.asarray(within.all(axis=1))
     near[tree.tiles_of(node)] = False
     if not near.any():
         return stand
@@ -133,7 +137,8 @@ def _tile(
 def _spaced(sets: Sequence[SurfelSet], scale: Sequence[FloatArray], wanted: int) -> float:
     """Metres: the radius of discs of which plants of these scales together need as many as are
     wanted; p(r) of section 4.1, and each no more than it has."""
-    at_one = [one.spacing.length * one.spacing.radius_m**2 * s**2 for one, s in zip(sets, scale)]
+    both = zip(sets, scale, strict=True)
+    at_one = [one.spacing.length * one.spacing.radius_m**2 * s**2 for one, s in both]
     return float((sum(float(one.sum()) for one in at_one) / wanted) ** 0.5)
 
 
@@ -144,7 +149,7 @@ def _placed(
     """Discs, relative to an origin, of the plants `which`, all of one species; and (n,) of which of
     those each is."""
     scale = stand.scale[which]
-    prefix, radius = surfels.discs(metres / np.where(scale > 0, scale, np.inf))
+    prefix, radius = surfels.discs(metres / np.maximum(scale, LEAST))
     of = np.repeat(np.arange(len(which), dtype=np.int32), prefix)
     row = np.arange(len(of)) - (np.cumsum(prefix) - prefix)[of]
     cos, sin = np.cos(stand.yaw[which])[of], np.sin(stand.yaw[which])[of]
@@ -176,7 +181,7 @@ def _lies_on(pyramid: Pyramid, node: Node, position: FloatArray, own: Bools) -> 
     cells, which = np.unique(cell, axis=0, return_inverse=True)
     there = np.zeros(len(cells), np.bool_)
     for index, (column, row) in enumerate(cells.tolist()):
-        inside = 0 <= min(column, row) and max(column, row) < 2**node.level
+        inside = min(column, row) >= 0 and max(column, row) < 2**node.level
         there[index] = inside and len(tree.tiles_of(Node(node.level, column, row))) > 0
     here = (cells == [node.column, node.row]).all(axis=1)
     which = which.ravel()

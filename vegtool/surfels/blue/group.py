@@ -30,8 +30,9 @@ PIXELS_OF_ROOT = 1.4
 """Along a side of the picture, for the root of the number of discs."""
 RESOLUTION = (64, 2048)
 """Pixels along a side, at least and at most."""
-MEANT = 8
-"""Discs for each surfel, of which its colour and its normal are means."""
+MEANT, LEAST = 8, 16_384
+"""Discs for each surfel of a prefix, and of all of it at least, of which colours and normals are
+means."""
 PLACES = 20_000
 """Candidates at most, at which the error is looked at."""
 FAR = 0.95
@@ -77,9 +78,7 @@ class Group:
 def discs_of(surfels: SurfelSet) -> Discs:
     """All of a set, as large as they are drawn where there are no more."""
     _, radius = surfels.discs(np.zeros(1))
-    return Discs(
-        surfels.position, surfels.normal, surfels.color, np.full(len(surfels), radius[0])
-    )
+    return Discs(surfels.position, surfels.normal, surfels.color, np.full(len(surfels), radius[0]))
 
 
 def together(some: Sequence[Discs]) -> Discs:
@@ -118,7 +117,7 @@ def grouped(discs: Discs, count: int, *, seed: int = 0, unlit: bool = False) -> 
     position = seen.position[order]
     surfels = SurfelSet(position, normal, color, spacing(position), unlit=unlit)
     error = 0.0
-    if len(surfels) < len(seen):
+    if 0 < len(surfels) < len(seen):
         some = seen.position[:: max(len(seen) // PLACES, 1)]
         error = float(np.quantile(cKDTree(surfels.position).query(some)[0], FAR))
     return Group(surfels, len(seen), error)
@@ -136,7 +135,7 @@ def _means(seen: Discs, order: IntArray) -> tuple[FloatArray, FloatArray]:
     length = 1 << (len(order) - 1).bit_length() if len(order) else 0
     while length > 0:  # the longest first, as the shortest is to count
         prefix = order[:length]
-        some = drawn(len(seen), min(MEANT * length, len(seen)), length)
+        some = drawn(len(seen), min(max(MEANT * length, LEAST), len(seen)), length)
         of = cKDTree(seen.position[prefix]).query(seen.position[some])[1]
         sums = np.stack(
             [np.bincount(of, column, len(prefix)) for column in weighed[some].T], axis=1
