@@ -65,13 +65,13 @@ def kept(place: Path) -> Path | None:
 
 @contextmanager
 def filling(
-    place: Path, source: Path, by_hand: str, whole: Callable[[Path], object] | None = None
+    place: Path, source: Path, by_hand: str, whole: Callable[[Path], object] = kept
 ) -> Iterator[Path]:
     """A folder to write into, which stands at `place` when the `with` block ends without an
     exception, unless another process has put one there.
 
     Raises OutputError where it cannot be made; by_hand: what the user can do to do without. whole:
-    whether a folder has all that it is to have; that of a chain if None.
+    whether a folder has all that it is to have; a chain, unless told otherwise.
     """
     part = place.with_name(f"{place.name}.{secrets.token_hex(6)}{PART}")
     try:
@@ -83,12 +83,12 @@ def filling(
         ) from error
     try:
         yield part
-        _move_in(part, place, whole or kept)
+        _move_in(part, place, whole)
     finally:
         shutil.rmtree(part, ignore_errors=True)
 
 
-def _move_in(part: Path, place: Path, whole: Callable[[Path], object]) -> None:
+def _move_in(part: Path, place: Path, whole: Callable[[Path], object] = kept) -> None:
     if whole(place):
         return
     shutil.rmtree(place, ignore_errors=True)  # what somebody has taken files from
