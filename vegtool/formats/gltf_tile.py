@@ -12,17 +12,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from vegtool.arrays import ByteArray, FloatArray
+from vegtool.errors import InputError
 from vegtool.formats import png
 from vegtool.formats.glb import ELEMENT_ARRAY_BUFFER, Document
 from vegtool.formats.gltf import ALPHA_CUTOFF, plant_document
 from vegtool.formats.gltf_material import UNLIT
-from vegtool.formats.gltf_surfels import add_surfels
+from vegtool.formats.gltf_surfels import add_surfels, read_surfel_set
 from vegtool.formats.plant_table import (
     PlantTable,
     add_tables,
@@ -175,6 +177,20 @@ def surfels_glb(surfels: SurfelSet, name: str, plain: bool = False) -> bytes:
     document = Document()
     document.show(add_surfels(document, surfels, name, np.zeros(3), not plain))
     return document.glb()
+
+
+def read_surfels_tile(path: Path) -> SurfelSet:
+    """What `surfels_glb` wrote, in metres from the tile's origin. Raises InputError for a file that
+    is missing or anything else."""
+    try:
+        return read_surfel_set(path)
+    except InputError as error:
+        reason = str(error).removeprefix(f"{path}: ").removesuffix(" Convert the plant again.")
+        raise InputError(f"{path}: {reason} It is a tile: make the tiles again") from error
+    except OSError as error:
+        raise InputError(
+            f"{path}: cannot be read ({error.strerror}). Make the tiles again"
+        ) from error
 
 
 def _indices(document: Document, group: Triangles) -> dict[str, int]:

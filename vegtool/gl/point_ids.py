@@ -12,11 +12,12 @@ import numpy.typing as npt
 
 from vegtool.arrays import FloatArray, checked
 from vegtool.gl.context import check, context, framebuffer_kept
-from vegtool.gl.pace import Pace
 from vegtool.gl.program import program
 
 MOST = 1 << 24
 """Discs that floats can number."""
+AT_ONCE = 200_000
+"""Discs that are drawn before they are waited for: software renderers hold a kilobyte of each."""
 LARGEST = 0.5
 """Of the radius of them all: no disc counts as larger."""
 
@@ -61,7 +62,6 @@ def seen_discs(
         array = ctx.vertex_array(
             shader, [(vertices, "3f 3f 1f", "in_position", "in_normal", "in_radius")]
         )
-        pace = Pace(ctx)
         try:
             frame.use()
             ctx.enable_only(moderngl.DEPTH_TEST | moderngl.PROGRAM_POINT_SIZE)
@@ -69,10 +69,9 @@ def seen_discs(
             for view in axes:
                 frame.clear()
                 shader["axes"] = tuple(view.T.ravel())
-                for first in range(0, count, min(pace.most, count)):
-                    many = min(pace.most, count - first)
-                    array.render(moderngl.POINTS, vertices=many, first=first)
-                    pace.sent(many)
+                for first in range(0, count, AT_ONCE):
+                    array.render(moderngl.POINTS, min(AT_ONCE, count - first), first=first)
+                    ctx.finish()
                 told = np.frombuffer(image.read(), np.float32)
                 seen[told.astype(np.int32)] = True
             check(ctx)

@@ -20,13 +20,14 @@ import numpy as np
 
 from vegtool.arrays import FloatArray
 from vegtool.elements import unordered
+from vegtool.formats.gltf_tile import read_surfels_tile
 from vegtool.gl.context import OnGpu
 from vegtool.gl.instances import INSTANCE, WHOLE, InstancedPlant
 from vegtool.gl.landscape import Landscape
 from vegtool.gl.upload import Textures
 from vegtool.plant import Plant, Texture
 from vegtool.preview.palette import PALETTE
-from vegtool.preview.tileset import Copies, Tileset, read_model, read_surfels, read_tile
+from vegtool.preview.tileset import Copies, Tileset, read_model, read_tile
 
 MOST_BYTES = 1 << 30
 """Bytes that are kept, on the GPU and beside it; more where what is drawn is more."""
@@ -123,7 +124,7 @@ class TileStore(OnGpu):
         file = self.tileset.file[tile]
         assert file is not None, "only tiles with content are drawn"
         if self.tileset.surfels[tile]:
-            surfels = read_surfels(Path(file))
+            surfels = read_surfels_tile(Path(file))
             index = self.landscape.add_surfels(surfels)
             size = SURFEL_BYTES * len(surfels)
             self._held[tile] = Held(surfels=index, bounds=surfels.bounds, surfel_bytes=size)

@@ -22,11 +22,9 @@ from vegtool.errors import InputError
 from vegtool.formats import read_plant
 from vegtool.formats.beside import find_beside
 from vegtool.formats.gltf_data import GltfFile, open_gltf
-from vegtool.formats.gltf_surfels import read_surfel_set
 from vegtool.formats.gltf_tile import INSTANCING
 from vegtool.formats.tileset import CLIENT_PX, TILESET
 from vegtool.plant import Plant
-from vegtool.surfel_set import SurfelSet
 
 LongArray = npt.NDArray[np.int64]
 
@@ -314,17 +312,6 @@ def read_tile(path: Path, model: Callable[[Path], Plant]) -> list[Copies]:
     except BROKEN as error:
         raise InputError(
             f"{path}: expected a tile as vegtool tiles writes it ({error!r}). Make it again"
-        ) from error
-
-
-def read_surfels(path: Path) -> SurfelSet:
-    """What a tile of surfels draws, from the tile's origin. Raises InputError for what is missing
-    or broken."""
-    try:
-        return read_surfel_set(path)
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot be read ({error.strerror}). Make the tiles again"
         ) from error
 
 

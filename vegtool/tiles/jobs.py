@@ -24,7 +24,7 @@ from vegtool.errors import (
     unknown,
 )
 from vegtool.formats import read_plant
-from vegtool.formats.gltf_surfels import read_surfel_set
+from vegtool.formats.gltf_tile import read_surfels_tile
 from vegtool.progress import Progress, silent
 from vegtool.scene import Scene
 from vegtool.tiles.journal import Entry, Hashed, key_of, write_file
@@ -341,7 +341,7 @@ def _of_quarters(world: World, job: FarJob, quarters: Sequence[tuple[Node, Entry
         return Made(there, again=False)
     seconds: dict[str, float] = {}
     with timed(seconds, "quarters"):
-        read = [(one, read_surfel_set(world.out / file_of(one))) for one, _ in quarters]
+        read = [(one, read_surfels_tile(world.out / file_of(one))) for one, _ in quarters]
     plants, full = (sum(e.facts[what] for _, e in quarters) for what in ("plants", "full"))
     below_m = max(entry.facts["error_m"] for _, entry in quarters)
     tile = quarters_tile(pyramid, node, read, plants, full, below_m)
