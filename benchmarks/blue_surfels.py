@@ -1,204 +1,113 @@
-"""Progressive blue surfels: orders of points, how long they take and how even they are.
+"""Progressive blue surfels: orders of points, how long they take, how even, and what they show.
 
-    python benchmarks/blue_surfels.py
-    python benchmarks/blue_surfels.py --parts orders --repeat 5 --violins docs/violins.png
+    python benchmarks/blue_surfels.py                        # minutes
+    python benchmarks/blue_surfels.py --parts orders --repeat 9
+    python benchmarks/blue_surfels.py --record --markdown --figures docs
 
 After Brandt, Jähn, Fischer and Meyer auf der Heide, "Rendering of complex heterogenous scenes using
-progressive blue surfels" (2019), table 2 and figure 3, on a model made by script (solids/).
+progressive blue surfels" (2019), tables and figures of the same numbers, on models made by script
+(solids/, samples).
 
-orders: 1.75 million candidates, as eight orthographic views show them; the paper's randomised
-order, ours and the exact one, for 10,000, 50,000 and 100,000 points: processor and wall time, in
-one thread, compiled before; and the distance from each point of a prefix to the nearest other, of
-the largest possible: least and median.
+candidates: of a tree, a statue and an airplane, and the share of what is seen that they miss.
+orders: their table 2 and figure 3. 1.75 million candidates, as eight orthographic pictures show
+them: milliseconds of drawing and of making arrays; an order at random, the paper's, ours and the
+exact one, of 10,000, 50,000 and 100,000 points: milliseconds in one thread; and the distance from
+each point of a prefix to the nearest other, of the largest possible. pictures: errors of prefixes
+of 100 to 100,000 points of the three models beside those of other orders, with discs as asked and
+with discs that cover as much as the original does; and their figure 4. plate: two sides a hair
+apart, ours with normals and without: the largest hole on a side, and time.
 
-plate: two sides a hair apart, ours with normals and without: the largest hole on a side, and time.
-
-What is missed of what is asked is told at the end, and the exit status is then 1.
+All times are of the processor. What is missed of what is asked is told at the end, and the exit
+status is then 1.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import sys
-from collections.abc import Callable
-from itertools import product
 from pathlib import Path
-from time import perf_counter, process_time
+from typing import Any
 
-import numpy as np
-from scipy.spatial import cKDTree
-from solids.rabbit import rabbit
+from blue import orders, plate, prefixes, seen, tables
+from blue.figures import errors, sheet, violins
+from recorded import markdown, record, written
 
-from vegtool.arrays import FloatArray, IntArray, unit
-from vegtool.gl.draw import Shot
-from vegtool.gl.surface import surface
-from vegtool.gl.upload import PlantBuffers
-from vegtool.measure.views import upright
-from vegtool.plant import Plant
-from vegtool.surfels.blue.distances import nearest, relative
-from vegtool.surfels.blue.exact import exact_order
-from vegtool.surfels.blue.farthest import farthest_order
-from vegtool.surfels.blue.randomised import randomised_order
+from vegtool import __version__
+from vegtool.gl.context import describe
 
-PARTS = ("orders", "plate")
-CANDIDATES = 1_750_000
-PIXELS = 1024
-SIZES = {10_000: 105.0, 50_000: 311.0, 100_000: 592.0}
-"""Points, and milliseconds of the paper's sampling (table 2)."""
-STRAWMAN = 3.0
-"""Times the paper's, that our own making of its order takes at most."""
-ASKED = {10_000: (0.7, 1.1, 1.0), 50_000: (0.7, 1.1, 1.0), 100_000: (1.1, 1.0, 1.0)}
-"""Of ours beside the paper's: time at most, least and median distance at least."""
-PREFIXES = (100, 300, 1_000, 3_000, 10_000, 30_000, 50_000, 100_000)
-VIOLINS = (1_000, 5_000, 10_000)
-"""Prefixes of figure 3."""
-HAIR_M = 1e-4
-WEIGHTS_M = (0.0, 0.005, 0.02, 0.1)
-"""Of normals, on a plate."""
-METHODS: dict[str, Callable[..., IntArray]] = {
-    "randomised": randomised_order,
-    "ours": farthest_order,
-    "exact": exact_order,
-}
+ROOT = Path(__file__).resolve().parent.parent
+PAGE = ROOT / "docs" / "methods" / "blue_surfels.md"
+MARK = "<!-- {} made by benchmarks/blue_surfels.py -->"
+PARTS = ("candidates", "orders", "pictures", "plate")
+REPEATS = 7
+"""Of what is timed, each with a seed of its own; medians are told."""
 
 
-def seen(plant: Plant) -> FloatArray:
-    """(n, 3) about CANDIDATES points of the surface, metres: what pixels of eight views show."""
-    corners = unit(np.array(list(product((-1.0, 1.0), repeat=3))))
-    with PlantBuffers(plant) as buffers:
-        rough = _points(buffers, corners, PIXELS)
-        side = round(PIXELS * (CANDIDATES / len(rough)) ** 0.5)
-        return _points(buffers, corners, side)
-
-
-def _points(buffers: PlantBuffers, directions: FloatArray, side: int) -> FloatArray:
-    positions = buffers.plant.positions
-    middle = (positions.min(axis=0) + positions.max(axis=0)) / 2
-    reach = float(np.linalg.norm(positions - middle, axis=1).max())
-    found = []
-    for direction in directions:
-        view = np.eye(4)
-        view[:3, :3] = np.stack([*upright(direction), -direction]) / reach
-        shot = Shot(view, middle, side, side)
-        found.append(surface(buffers, shot).position)
-    return np.concatenate(found)
-
-
-def area_of(plant: Plant) -> float:
-    a, b, c = (plant.positions[plant.faces[:, i]] for i in range(3))
-    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
-
-
-def orders(repeat: int, violins: Path | None) -> list[str]:
-    """Prints times and distances; what is missed."""
-    plant = rabbit()
-    points, area = seen(plant), area_of(plant)
-    print(f"{len(points):,} candidates\n")
-    start = process_time()
-    for method in METHODS.values():
-        method(points[:1_000], 100)
-    print(f"compiled or loaded in {process_time() - start:.1f} s, not counted below\n")
-    missed, shown = [], {}
-    for size, paper in SIZES.items():
-        spent: dict[str, list[tuple[float, float]]] = {name: [] for name in METHODS}
-        spread: dict[str, list[FloatArray]] = {name: [] for name in METHODS}
-        prefixes = [prefix for prefix in PREFIXES if prefix <= size]
-        for seed in range(repeat):
-            for name, method in METHODS.items():
-                wall, cpu = perf_counter(), process_time()
-                order = method(points, size, seed=seed)
-                spent[name].append((process_time() - cpu, perf_counter() - wall))
-                found = [nearest(points[order[:prefix]]) for prefix in prefixes]
-                scale = [(2 * area / (3**0.5 * prefix)) ** 0.5 for prefix in prefixes]
-                spread[name].append(
-                    np.array(
-                        [(d.min() / s, np.median(d) / s) for d, s in zip(found, scale, strict=True)]
-                    )
-                )
-                if seed == 0 and size == max(SIZES):
-                    shown[name] = order
-        times = {name: np.median(rows, axis=0) for name, rows in spent.items()}
-        even = {name: np.median(rows, axis=0) for name, rows in spread.items()}
-        print(f"{size:,} points (paper: {paper:.0f} ms)")
-        for name in METHODS:
-            cpu, wall = times[name] * 1e3
-            part = times[name][0] / times["randomised"][0]
-            print(f"  {name:10} {cpu:6.0f} ms processor {wall:6.0f} ms wall  {part:5.2f}")
-        print("  prefix     " + "".join(f"{prefix:9,}" for prefix in prefixes))
-        for i, what in enumerate(("least", "median")):
-            for name in METHODS:
-                print(f"  {name:10} " + "".join(f"{v:9.3f}" for v in even[name][:, i]), what)
-            ratio = even["ours"][:, i] / even["randomised"][:, i]
-            print(f"  {'ratio':10} " + "".join(f"{v:9.3f}" for v in ratio), what)
-            least = ASKED[size][1 + i]
-            missed += [
-                f"{size:,}: {what} distance at {prefix:,} is {v:.3f} times, not {least}"
-                for prefix, v in zip(prefixes, ratio, strict=True)
-                if v < least
-            ]
-        part = times["ours"][0] / times["randomised"][0]
-        if part > ASKED[size][0]:
-            missed.append(f"{size:,}: time is {part:.2f} times, not {ASKED[size][0]}")
-        if times["randomised"][0] * 1e3 > STRAWMAN * paper:
-            missed.append(f"{size:,}: the paper's order takes over {STRAWMAN} times its {paper} ms")
-        print()
-    if violins is not None:
-        random = np.random.default_rng(0).permutation(len(points))
-        draw_violins(violins, points, {"random": random, **shown}, area)
-    return missed
-
-
-def plate(repeat: int) -> None:
-    """Prints holes, with normals and without."""
-    rng = np.random.default_rng(0)
-    side = np.where(np.arange(CANDIDATES) < CANDIDATES // 2, 1.0, -1.0)
-    points = np.column_stack([rng.random((CANDIDATES, 2)), HAIR_M / 2 * side])
-    normals = np.outer(side, [0.0, 0.0, 1.0])
-    print(f"a plate of one metre, its sides {HAIR_M} m apart: largest hole of a side")
-    for size, weight in product(SIZES, WEIGHTS_M):
-        spent, holes = [], []
-        for seed in range(repeat):
-            start = process_time()
-            order = farthest_order(points, size, seed=seed, normals=normals, normal_weight=weight)
-            spent.append(process_time() - start)
-            for way in (-1, 1):
-                chosen = points[order][side[order] == way]
-                holes.append(cKDTree(chosen).query(points[side == way][::10])[0].max())
-        print(
-            f"  {size:7,} points, weight {weight:5} m: {np.median(spent) * 1e3:6.0f} ms processor,"
-            f" {np.median(holes):.5f} m"
-        )
-
-
-def draw_violins(path: Path, points: FloatArray, order: dict[str, IntArray], area: float) -> None:
-    """Figure 3's plots."""
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(1, len(VIOLINS), figsize=(10, 4), sharey=True)
-    for ax, prefix in zip(axes, VIOLINS, strict=True):
-        data = [relative(points[rows[:prefix]], area) for rows in order.values()]
-        ax.violinplot(data, showmedians=True, showextrema=True, widths=0.8)
-        ax.set_xticks(range(1, len(order) + 1), list(order), rotation=20)
-        ax.set_title(f"{prefix:,} points")
-    axes[0].set_ylabel("relative distance to the nearest point")
-    figure.tight_layout()
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
+def say(text: str) -> None:
+    print(text, flush=True)
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--parts", default=",".join(PARTS), help="of " + ", ".join(PARTS))
-    parser.add_argument("--repeat", type=int, default=5, help="seeds; medians are told")
-    parser.add_argument("--violins", type=Path, help="PNG to write")
-    options = parser.parse_args()
-    missed = []
-    if "orders" in options.parts.split(","):
-        missed += orders(options.repeat, options.violins)
-    if "plate" in options.parts.split(","):
-        plate(options.repeat)
-    print("\n".join(missed) if missed else "nothing is missed")
-    return int(bool(missed))
+    parser.add_argument("--parts", default=",".join(PARTS))
+    parser.add_argument("--repeat", type=int, default=REPEATS, help="seeds; medians are told")
+    parser.add_argument("--record", action="store_true")
+    parser.add_argument("--markdown", action="store_true")
+    parser.add_argument("--figures", type=Path)
+    given = parser.parse_args()
+    parts = given.parts.split(",")
+    if set(parts) - set(PARTS):
+        parser.error(f"unknown parts; known: {', '.join(PARTS)}")
+    rows: dict[str, list[dict[str, Any]]] = {}
+    shown: dict[str, list[dict[str, Any]]] = {}
+    missed: list[str] = []
+
+    def told(name: str, table: list[dict[str, Any]]) -> None:
+        shown[name] = table
+        say(f"{name}\n{markdown(table)}\n")
+
+    if given.figures is not None:
+        given.figures.mkdir(parents=True, exist_ok=True)
+    if "candidates" in parts:
+        rows["candidates"] = tables.seen_rows([seen.measured(name) for name in prefixes.MODELS])
+        told("candidates", rows["candidates"])
+    if "orders" in parts:
+        ordered = orders.measured(given.repeat)
+        many, side = len(ordered.pictured.found), ordered.pictured.resolution
+        say(f"{many:,} candidates, of pictures of {side} pixels a side")
+        say(f"compiled or loaded in {ordered.compiling_s:.1f} s, not counted\n")
+        rows["orders"] = tables.order_rows(ordered)
+        rows["distances"] = tables.distance_rows(ordered)
+        told("orders", tables.order_table(ordered))
+        told("distances", tables.distance_table(ordered))
+        missed += tables.missed(ordered)
+        if given.figures is not None:
+            violins(given.figures / "blue_violins.png", ordered)
+    if "pictures" in parts:
+        found = {name: prefixes.measured(name) for name in prefixes.MODELS}
+        scores = [one for those, _ in found.values() for one in those]
+        rows["pictures"] = tables.picture_rows(scores)
+        told("pictures", tables.picture_table(scores))
+        told("equal", tables.equal_table(scores))
+        if given.figures is not None:
+            errors(given.figures / "blue_pictures.png", scores)
+            pictures = {name: found[name][1] for name in prefixes.SHOWN}
+            sheet(given.figures / "blue_prefixes.jpg", pictures)
+    if "plate" in parts:
+        sides = plate.measured(given.repeat)
+        rows["plate"] = tables.plate_rows(sides)
+        told("plate", tables.plate_table(sides))
+    if given.record:
+        machine = {"version": __version__, "renderer": describe().renderer, "cores": os.cpu_count()}
+        for name, some in rows.items():
+            record(f"blue_{name}", [{**machine, **row} for row in some])
+    if given.markdown:
+        for name, some in shown.items():
+            written(PAGE, MARK.format(name), markdown(some))
+    for sentence in missed:
+        say(f"missed: {sentence}")
+    return 1 if missed else 0
 
 
 if __name__ == "__main__":

@@ -86,12 +86,16 @@ class SurfelSet:
 
     def first(self, count: int) -> SurfelSet:
         """The set of a prefix, `count` surfels or all."""
+        return self.of(slice(count), replace(self.spacing, total=min(count, len(self))))
+
+    def of(self, rows: slice | npt.NDArray[np.integer], spacing: Spacing) -> SurfelSet:
+        """A set of some of them, in rising order, and its spacing."""
         return replace(
             self,
-            position=self.position[:count],
-            normal=self.normal[:count],
-            color=self.color[:count],
-            spacing=replace(self.spacing, total=min(count, len(self))),
+            position=self.position[rows],
+            normal=self.normal[rows],
+            color=self.color[rows],
+            spacing=spacing,
         )
 
     def moved(self, shift: FloatArray) -> SurfelSet:

@@ -20,10 +20,12 @@ import pytest
 from hybrids import hybrid_of
 from programs import MARKS, MODELS, node
 
+from vegtool.convert import ConvertOptions, convert
 from vegtool.formats import READERS
 from vegtool.formats.gltf import write_chain
 from vegtool.growth import SAMPLES, sample
 from vegtool.lod import Display, Level, LodChain
+from vegtool.measure.options import MeasureOptions
 
 # A silhouette is a grid of cells, of which those count that are covered by a quarter at least: the
 # outline of a crown, not of each leaf. Four pixels to a cell make a plant about 250 pixels high,
@@ -97,7 +99,11 @@ def vegtool(*arguments: str | Path) -> str:
 
 HYBRIDS = {f"hybrid {sides}": sides == "double" for sides in ("double", "opposite")}
 """Chains with a level of mesh and billboards, by whether it is double-sided."""
-FILES = [*SOURCES, *HYBRIDS]
+SURFELS = {f"surfels {bits}": bits == "quantized" for bits in ("plain", "quantized")}
+"""Chains of points, by whether they are quantized."""
+POINTS = 60_000
+"""Of a level that is to have a silhouette: three.js draws each as one pixel."""
+FILES = [*SOURCES, *HYBRIDS, *SURFELS]
 
 
 @pytest.fixture(scope="session")
@@ -115,7 +121,17 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Written]:
     found = {name: _written(path, outcomes[path]) for name, path in paths.items()}
     for name, double_sided in HYBRIDS.items():
         found[name] = _hybrid(folder / name, double_sided)
+    for name, quantized in SURFELS.items():
+        found[name] = _surfels(folder / name, quantized)
     return found
+
+
+def _surfels(folder: Path, quantized: bool) -> Written:
+    """A sample whose level is surfels."""
+    options = ConvertOptions(method="surfels", points=POINTS, levels=1)
+    chain = convert(sample("broadleaf", 4000), options, MeasureOptions(measure="off"))
+    first, combined, _ = write_chain(chain, folder, quantized=quantized)
+    return Written(combined, combined, [first])
 
 
 def _hybrid(folder: Path, double_sided: bool) -> Written:

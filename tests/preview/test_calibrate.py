@@ -62,7 +62,7 @@ def correction(
 ) -> tuple[Kinds, list[float], Correction]:
     """What the kinds are, the shares that were told, and what was found."""
     made, (elements,) = kinds((species,)), elements_of((species,))
-    steps = list(corrected(made, species, 0, elements[0], landscape, FOCAL_PX, fade))
+    steps = list(corrected(made, species, 0, elements[0], landscape, {}, FOCAL_PX, fade))
     shares, found = [share for share, _ in steps], steps[-1][1]
     return replace(made, corrections=(found,)), shares, found
 

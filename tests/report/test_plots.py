@@ -76,7 +76,7 @@ def test_ids_of_two_figures_differ() -> None:
 
 
 def test_families_look_different() -> None:
-    families = [*LOOKS, "surfels", "blue surfels"]
+    families = [*LOOKS, "one more", "another"]
     looks = [look(family, families) for family in families]
     assert len({color for color, _ in looks}) == len({marker for _, marker in looks}) == len(looks)
 

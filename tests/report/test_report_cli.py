@@ -208,8 +208,8 @@ def test_an_only_plant_that_is_broken(tmp_path: Path, capsys: pytest.CaptureFixt
         (["--budgets", ""], "got none"),
         (
             ["--methods", "kmeans,voronoi"],
-            "expected some of refined, hybrid, surfel-billboards, branches, isodata, kmeans, "
-            "planes; got voronoi",
+            "expected some of refined, hybrid, surfel-billboards, surfels, branches, isodata, "
+            "kmeans, planes; got voronoi",
         ),
         (["--methods", ","], "got none"),
         (["--max-error", "2"], "--max-error: expected 0 to 1"),

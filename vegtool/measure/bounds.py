@@ -18,6 +18,7 @@ import numpy as np
 from vegtool.arrays import FloatArray, IntArray
 from vegtool.lod import Atlas, Billboards, Display, Level
 from vegtool.measure.views import Camera
+from vegtool.plant import Plant
 
 VALID_SHARE = 0.5
 """theta of eq. 7: the share of all directions in which a billboard is to be valid."""
@@ -144,19 +145,23 @@ def distance_for_pixels(level: Level, center: FloatArray, display: Display, pixe
 
     That is eq. 1 with bounds for both errors: nothing is drawn further than that from its place,
     and no texel covers more. A mesh counts by the level's geometric error, of which a hybrid's own
-    is a part; the original's distance is 0. Raises ValueError for a mesh whose geometric error is
-    not known.
+    is a part, and so do surfels; the original's distance is 0. Raises ValueError where that error
+    is not known.
     """
     size, reach = np.zeros(0), np.zeros(0)
     if level.billboards is not None and level.atlas is not None:
         texel = _texel_size(level.billboards, level.atlas)
         size = np.maximum(level.billboards.half_depth, texel)
         reach = _reach(level.billboards, center)
-    if level.mesh is not None:
+    shown = level.mesh if level.surfels is None else level.surfels
+    if shown is not None:
         if level.geometric_error_m is None:
-            raise ValueError("distance_for_pixels: a mesh needs its geometric_error_m")
+            raise ValueError(
+                "distance_for_pixels: a mesh, or surfels, need their geometric_error_m"
+            )
         error = level.geometric_error_m[0]
-        farthest = np.linalg.norm(level.mesh.positions - center, axis=1).max(initial=0.0)
+        places = shown.positions if isinstance(shown, Plant) else shown.position
+        farthest = np.linalg.norm(places - center, axis=1).max(initial=0.0)
         size, reach = np.append(size, error), np.append(reach, farthest + error)
 
     if not size.any():

@@ -10,7 +10,7 @@ is compared from each side by itself.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import atan, ceil, degrees
 
@@ -82,12 +82,14 @@ def corrected(
     kind: int,
     elements: Elements,
     landscape: Landscape,
+    pieces: Mapping[int, Sequence[int]],
     focal_px: float,
     fade: FadeMode,
 ) -> Iterator[tuple[float, Correction]]:
     """Yields the share that is done, and what was found so far: `Kinds.corrections` of one kind.
 
-    elements: of the original. landscape: of which the kinds are. focal_px: as of the kinds.
+    elements: of the original. landscape: of which the kinds are. pieces: as of `point_batches`.
+    focal_px: as of the kinds.
     """
     levels = switches(kinds, 1.0)
     at = distances(levels, kind)
@@ -104,7 +106,7 @@ def corrected(
             for _ in range(ROUNDS):
                 drawn = np.array(
                     [
-                        _drawn(landscape, kinds, view, each, fade)
+                        _drawn(landscape, pieces, kinds, view, each, fade)
                         for view, each in zip(views, found, strict=True)
                     ]
                 )
@@ -121,13 +123,16 @@ def corrected(
             yield (i + 1) / len(at), Correction(stage, factor)
 
 
-def _drawn(landscape: Landscape, kinds: Kinds, view: View, factor: float, fade: FadeMode) -> float:
+def _drawn(
+    landscape: Landscape, pieces: Mapping[int, Sequence[int]], kinds: Kinds, view: View,
+    factor: float, fade: FadeMode,
+) -> float:  # fmt: skip
     """What a plant covers whose lengths are changed by a factor."""
     only = Correction(np.zeros(1), np.full((1, SIDES), factor))
     tried = replace(kinds, corrections=(only,) * len(kinds.count))
     eye, size, seen = view
     what = chosen(seen, tried, 1.0, fade)
-    points = point_batches(landscape, seen, what, eye.focal_px(size[1]))
+    points = point_batches(landscape, pieces, seen, what, eye.focal_px(size[1]))
     return _covered(landscape, replace(frame(seen, what), points=points), view, 1, MSAA)
 
 

@@ -39,6 +39,7 @@ from vegtool.preview.points import point_batches
 from vegtool.preview.reveal import noise
 from vegtool.preview.scenery import AS_IT_IS, VIEWS, FrameStats, Look
 from vegtool.preview.stock import Stock, stocked
+from vegtool.surfels.blue.pieces import pieces
 from vegtool.tiles.library import Species
 from vegtool.tiles.placement import Placement
 
@@ -74,6 +75,7 @@ class Forest(OnGpu):
         self._landscape: Landscape | None = None
         self._elements: list[list[Elements]] = []
         self._models: list[list[int]] = []
+        self._pieces: dict[int, list[int]] = {}
         self._corrections: list[Correction] = []
         self._kinds: dict[float, Kinds] = {}
         self._stocks: OrderedDict[int, Stock] = OrderedDict()
@@ -96,14 +98,17 @@ class Forest(OnGpu):
                 done += 1
                 yield done / total
             if one.surfels is not None:
-                self._models[-1].append(landscape.add_surfels(one.surfels.read()))
+                parts = [landscape.add_surfels(part) for part in pieces(one.surfels.read())]
+                self._models[-1].append(parts[0])
+                self._pieces[parts[0]] = parts
         if self.sharp:
             return
         plain = kinds_of(self.species, self._elements, self._models, CALIBRATED_PX)
         for index, one in enumerate(self.species):
             steps = corrected(
-                plain, one, index, self._elements[index][0], landscape, CALIBRATED_PX, self.fade
-            )
+                plain, one, index, self._elements[index][0], landscape, self._pieces,
+                CALIBRATED_PX, self.fade,
+            )  # fmt: skip
             found = NONE
             for share, found in steps:  # noqa: B007  # the last one is the whole
                 yield (done + share * len(one.levels)) / total
@@ -201,7 +206,7 @@ class Forest(OnGpu):
             middle = found.place.astype(np.float64)
             middle[:, 1] += scale * kinds.center[kind]
             size_px *= factors(look.fovea, middle, scale * kinds.radius[kind], eye, size)
-        points = point_batches(self._landscape, found, what, focal, size_px, paint)
+        points = point_batches(self._landscape, self._pieces, found, what, focal, size_px, paint)
         return replace(frame(found, what, paint), points=points)
 
     def _paint(self, found: Seen, what: Chosen, color: Color) -> np.ndarray | None:

@@ -8,6 +8,7 @@ from functools import partial
 
 from vegtool.baselines import BASELINES, baseline
 from vegtool.convert import (
+    SURFELS,
     TRIANGLES_PER_BILLBOARD,
     level_maker,
     near_pixels,
@@ -18,7 +19,7 @@ from vegtool.lod import Level
 from vegtool.measure.scores import TruthsAt
 from vegtool.measure.views import View, distance_of
 from vegtool.progress import Progress
-from vegtool.report.options import FAMILIES, ReportOptions
+from vegtool.report.options import FAMILIES, SURFELS_PER_BILLBOARD, ReportOptions
 from vegtool.report.rows import LIVE
 from vegtool.timing import timed
 
@@ -87,9 +88,14 @@ def _level(
     progress: Progress,
 ) -> Made:
     """A level of a family, all that it needs made for it alone."""
+    convert, count = FAMILIES[family], budget
+    if convert.method == SURFELS:
+        count = SURFELS_PER_BILLBOARD * budget
+        convert = replace(convert, points=count)
+    else:
+        convert = replace(convert, billboards=budget)
     convert = replace(
-        FAMILIES[family],
-        billboards=budget,
+        convert,
         fov=options.fov,
         image_height=options.image_height,
         seed=options.seed,
@@ -98,7 +104,7 @@ def _level(
     seconds: dict[str, float] = {}
     with timed(seconds, "plant"):
         make = level_maker(buffers, truth_at, convert)
-    level = make(budget, near_m, progress)
+    level = make(count, near_m, progress)
     return Made(level, level.triangles, level.texels, lambda: {**seconds, **level.seconds})
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from vegtool.clustering import METHODS
-from vegtool.convert import MOST_BILLBOARDS, ConvertOptions
+from vegtool.convert import MOST_BILLBOARDS, SURFELS, ConvertOptions
 from vegtool.errors import UsageError
 from vegtool.lod import Display
 from vegtool.measure.options import MeasureOptions
@@ -16,9 +16,12 @@ FAMILIES: Mapping[str, ConvertOptions] = {
     "refined": ConvertOptions(),
     "hybrid": ConvertOptions(method="hybrid"),
     "surfel-billboards": ConvertOptions(method="surfel-billboards"),
+    "surfels": ConvertOptions(method=SURFELS),
     **{method: ConvertOptions(refine="none", method=method) for method in METHODS},
 }
 """What is compared, and by which options `convert` makes it."""
+SURFELS_PER_BILLBOARD = 64
+"""Of a budget: about as many bytes as a billboard and its share of an atlas."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +35,10 @@ class ReportOptions:
         ",".join(FAMILIES), "Methods to compare, with commas between.", metavar="NAME,..."
     )
     budgets: str = option(
-        "16,64,256,1024", "Billboards of each method, with commas between.", metavar="N,..."
+        "16,64,256,1024",
+        f"Billboards of each method, with commas between; or {SURFELS_PER_BILLBOARD} times as many "
+        "surfels.",
+        metavar="N,...",
     )
     views: str = same_option(MeasureOptions, "views")
     view_count: int = option(12, "Directions that every error is a mean over.", least=1, most=1000)

@@ -39,6 +39,7 @@ LOOKS: dict[str, tuple[str, str]] = {
     "refined": ("#8250c4", "p"),
     "hybrid": ("#8a1538", "h"),
     "surfel-billboards": ("#2e6b2e", "d"),
+    "surfels": ("#b5179e", "8"),
     "branches": ("#009e73", "o"),
     "isodata": ("#0072b2", "s"),
     "kmeans": ("#e69f00", "^"),
@@ -50,7 +51,7 @@ LOOKS: dict[str, tuple[str, str]] = {
     "octahedral": ("#8a8f94", "X"),
 }
 """Colour and marker by family."""
-OTHERS = (("#a0522d", "<"), ("#2e8b8b", ">"), ("#b08fd0", "H"), ("#4b5d16", "8"))
+OTHERS = (("#a0522d", "<"), ("#2e8b8b", ">"), ("#b08fd0", "H"), ("#4b5d16", "1"))
 """For families that are new here, in turn."""
 HALO = 2.5
 """Points, around words."""
