@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from surfel_sets import ball
@@ -9,7 +11,7 @@ from surfel_sets import ball
 from vegtool.errors import UsageError
 from vegtool.surfel_set import Spacing, SurfelSet
 from vegtool.surfels.blue.distances import nearest
-from vegtool.surfels.blue.group import Discs, discs_of, grouped, outside, together
+from vegtool.surfels.blue.group import Discs, covering, discs_of, grouped, outside, together
 
 pytestmark = pytest.mark.gl
 
@@ -60,6 +62,22 @@ def test_few_and_copies() -> None:
     assert len(grouped(one, 0).surfels) == 0
     with pytest.raises(UsageError):
         grouped(one, -1)
+
+
+def test_factors_of_radii_are_those_of_the_parts() -> None:
+    """At the same radius: a ball of twice the scale has four times as many there, so factors that
+    double with four times the prefix are twice as large; of parts, the larger one's counts for
+    more. Where all are 1, so is the group's."""
+    plain = ball(1000)
+    steep = replace(plain, covering=2.0 ** (np.arange(11) / 2))
+    one, double = np.ones(1), np.full(1, 2.0)
+    alone = covering([steep], [one], plain.spacing)
+    assert np.allclose(alone[:-1], steep.covering[:-1], rtol=0.01)
+    larger = covering([steep], [double], plain.spacing)
+    assert np.allclose(larger[:-3], 2 * alone[:-3], rtol=0.03)
+    both = covering([steep, plain], [one, double], plain.spacing)
+    assert np.allclose(both**2, (alone**2 + 4) / 5)
+    assert covering([plain, plain], [one, double], plain.spacing).tolist() == [1.0]
 
 
 def test_discs_are_as_large_as_they_are_drawn() -> None:

@@ -13,7 +13,7 @@ as near as their nearest end is; they are split, and each surfel is on the squar
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +21,7 @@ import numpy.typing as npt
 from vegtool.arrays import FloatArray, IntArray
 from vegtool.formats.gltf_tile import surfels_glb
 from vegtool.surfel_set import SurfelSet
-from vegtool.surfels.blue.group import Discs, discs_of, grouped, together
+from vegtool.surfels.blue.group import Discs, covering, discs_of, grouped, together
 from vegtool.tiles.make import Tile
 from vegtool.tiles.pyramid import FEWEST, Pyramid
 from vegtool.tiles.quadtree import Node
@@ -78,7 +78,8 @@ def plants_tile(pyramid: Pyramid, shared: Shared, node: Node, stand: Stand, own:
         kinds = np.unique(stand.species)
         sets = [shared.sample(int(kind)) for kind in kinds]
         wanted = CANDIDATES * count
-        metres = _spaced(sets, [stand.scale[stand.species == kind] for kind in kinds], wanted)
+        scales = [stand.scale[stand.species == kind] for kind in kinds]
+        metres = _spaced(sets, scales, wanted)
         parts = list[Discs]()
         for kind, surfels in zip(kinds, sets, strict=True):
             which = np.flatnonzero(stand.species == kind)
@@ -91,8 +92,8 @@ def plants_tile(pyramid: Pyramid, shared: Shared, node: Node, stand: Stand, own:
         discs = together(parts)
         if not len(discs):  # all that stands here lies elsewhere
             discs = every[0].of(which[every[1]] < own)
-    unlit = all(one.unlit for one in sets)
-    return _tile(pyramid, node, discs, count, own, full, unlit, 0.0, seconds)
+    of = _Of(sets, scales, own, full)
+    return _tile(pyramid, node, discs, count, of, 0.0, seconds)
 
 
 def quarters_tile(
@@ -116,21 +117,33 @@ def quarters_tile(
         away = [pyramid.origin(one) - pyramid.origin(node) for one, _ in quarters]
         sets = [one.moved(shift) for (_, one), shift in zip(quarters, away, strict=True)]
         discs = together([discs_of(one) for one in sets])
-    unlit = all(one.unlit for one in sets)
-    return _tile(pyramid, node, discs, count, plants, full, unlit, below_m, seconds)
+    of = _Of(sets, [np.ones(1)] * len(sets), plants, full)
+    return _tile(pyramid, node, discs, count, of, below_m, seconds)
+
+
+@dataclass(frozen=True, eq=False)
+class _Of:
+    """What a square is made of: sets, at which scales each, plants, and their triangles in full."""
+
+    sets: Sequence[SurfelSet]
+    scales: Sequence[FloatArray]
+    plants: int
+    full: int
 
 
 def _tile(
-    pyramid: Pyramid, node: Node, discs: Discs, count: int, plants: int, full: int, unlit: bool,
-    below_m: float, seconds: dict[str, float],
+    pyramid: Pyramid, node: Node, discs: Discs, count: int, of: _Of, below_m: float,
+    seconds: dict[str, float],
 ) -> Tile:  # fmt: skip
     with timed(seconds, "order"):
-        made = grouped(discs, count, unlit=unlit)
+        made = grouped(discs, count, unlit=all(one.unlit for one in of.sets))
+        covers = covering(of.sets, of.scales, made.surfels.spacing)
+    surfels = replace(made.surfels, covering=covers)
     with timed(seconds, "writing"):
-        data = surfels_glb(made.surfels, str(node), pyramid.options.plain)
+        data = surfels_glb(surfels, str(node), pyramid.options.plain)
     return Tile(
-        node, data, "surfels", plants, 0, 1, below_m + made.error_m,
-        made.surfels.bounds + pyramid.origin(node), len(made.surfels), full, seconds,
+        node, data, "surfels", of.plants, 0, 1, below_m + made.error_m,
+        surfels.bounds + pyramid.origin(node), len(surfels), of.full, seconds,
     )  # fmt: skip
 
 

@@ -18,8 +18,8 @@ import numpy.typing as npt
 from vegtool.arrays import FloatArray, IntArray, checked, unit
 from vegtool.gl.point_ids import seen_discs
 from vegtool.measure.views import upright
-from vegtool.surfel_set import SurfelSet
-from vegtool.surfels.blue.distances import spacing
+from vegtool.surfel_set import Spacing, SurfelSet
+from vegtool.surfels.blue import distances
 from vegtool.surfels.blue.farthest import farthest_order
 from vegtool.surfels.blue.places import drawn
 
@@ -28,6 +28,8 @@ FLATTEST = 0.5
 landscape are, are looked at from 19 degrees above their border at least."""
 PIXELS_OF_ROOT = 1.4
 """Along a side of the picture, for the root of the number of discs."""
+SMALLEST_M = 1e-9
+"""Radius of discs: none counts as less."""
 RESOLUTION = (64, 2048)
 """Pixels along a side, at least and at most."""
 MEANT, LEAST = 8, 16_384
@@ -89,6 +91,27 @@ def together(some: Sequence[Discs]) -> Discs:
     )  # fmt: skip
 
 
+def covering(
+    parts: Sequence[SurfelSet], scales: Sequence[FloatArray], spacing: Spacing
+) -> FloatArray:
+    """(k,) SurfelSet.covering of a group: as parts of it are covered with discs of the same radius,
+    the larger ones counting for more. scales: (m,) of each part, at which it is there m times, or
+    nearly. spacing: of the group."""
+    if all((one.covering == 1.0).all() for one in parts):
+        return np.ones(1)
+    count = 1 + max(int(np.ceil(np.log2(max(spacing.total, 1)))), 0)
+    area, squared = np.zeros(count), np.zeros(count)
+    for step in range(count):
+        radius = spacing.radius(2**step)
+        for part, scale in zip(parts, scales, strict=True):
+            own = part.spacing
+            at_one = own.length * (own.radius_m * scale) ** 2 + SMALLEST_M**2
+            prefix = np.clip(at_one / max(radius, SMALLEST_M) ** 2, 1, len(part))
+            area[step] += at_one.sum()
+            squared[step] += (at_one * part.factors(prefix) ** 2).sum()
+    return np.asarray(np.sqrt(squared / area))
+
+
 def outside(discs: Discs) -> npt.NDArray[np.bool_]:
     """(n,) which discs are seen from outside: from a corner of their bounds. One at least is.
 
@@ -115,7 +138,7 @@ def grouped(discs: Discs, count: int, *, seed: int = 0, unlit: bool = False) -> 
     order = farthest_order(seen.position, count, seed=seed)
     color, normal = _means(seen, order)
     position = seen.position[order]
-    surfels = SurfelSet(position, normal, color, spacing(position), unlit=unlit)
+    surfels = SurfelSet(position, normal, color, distances.spacing(position), unlit=unlit)
     error = 0.0
     if 0 < len(surfels) < len(seen):
         some = seen.position[:: max(len(seen) // PLACES, 1)]
