@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -45,11 +46,15 @@ FEET = [(4, 4), (12, 4), (20, 20), (28, 28), (60, 60)]
 """Metres east and north. Tiles of 16 m: two squares of 32 m that are surfels, and the whole."""
 
 
+def few(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(samples, "COUNT", 400)
+    patch.setattr(pyramids, "FEWEST", 100)
+    patch.setattr(pyramids, "MOST", 200)
+
+
 @pytest.fixture(autouse=True)
 def _few(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(samples, "COUNT", 400)
-    monkeypatch.setattr(pyramids, "FEWEST", 100)
-    monkeypatch.setattr(pyramids, "MOST", 200)
+    few(monkeypatch)
 
 
 def library(folder: Path, **plants: Plant) -> Path:
@@ -92,7 +97,7 @@ def written(at: World) -> dict[str, Entry]:
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[World, dict[str, Entry]]:
     with pytest.MonkeyPatch.context() as patch:
-        _few.__wrapped__(patch)  # type: ignore[attr-defined]
+        few(patch)
         at = world(tmp_path_factory.mktemp("made"), bushes(), bush=BUSH)
         return at, written(at)
 
@@ -114,12 +119,10 @@ def test_squares_that_are_not_instances_are_surfels(made: tuple[World, dict[str,
                 assert len(surfels) == facts["surfels"] <= 100, "half as many as triangles, or 100"
                 bounds = surfels.bounds
                 assert np.allclose(bounds, facts["bounds"], atol=1e-5)
-    assert tree.depth - of_kind(at.pyramid, found, 1)[0].level == 1
     assert check_tileset(at.out / "tileset.json") == []
     root = json.loads((at.out / "tileset.json").read_bytes())["root"]
     assert root["extras"]["surfels"] > 0
     assert root["geometricError"] >= at.pyramid.error_m(tree.depth)
-    open_gltf(at.out / file_of(Node(0, 0, 0)))
 
 
 def test_surfels_are_on_their_plants(made: tuple[World, dict[str, Entry]]) -> None:
@@ -145,8 +148,8 @@ def test_surfels_are_on_their_plants(made: tuple[World, dict[str, Entry]]) -> No
 def test_a_square_is_made_of_the_files_of_its_quarters(
     made: tuple[World, dict[str, Entry]],
 ) -> None:
-    """Nothing else is read: the same bytes without plants; every surfel is one of theirs; and one
-    quarter alone has a quarter of its surfels above, but for the fewest."""
+    """Nothing else is read, so it is the same where species have no surfels any more; and every
+    surfel is one of theirs."""
     at, found = made
     pyramid = at.pyramid
     for height in range(2, pyramid.tree.depth + 1):
@@ -161,6 +164,21 @@ def test_a_square_is_made_of_the_files_of_its_quarters(
             assert away.min(axis=1).max() < 1e-4
             full = sum(found[str(one)].facts["full"] for one in pyramid.tree.quarters(node))
             assert found[str(node)].facts["full"] == full
+            alone = replace(at, pyramid=replace(pyramid, samples=()))
+            before = (at.out / file_of(node)).read_bytes()
+            known = tuple((one, found[str(one)]) for one in pyramid.tree.quarters(node))
+            (outcome,) = do(alone, FarJob(node=node, quarters=known))
+            assert isinstance(outcome, Made) and outcome.again
+            assert (at.out / file_of(node)).read_bytes() == before
+
+
+def test_how_many_stand_for_how_much(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Half as many as triangles, in limits; above a single quarter, seen at half the size, a
+    quarter of its own."""
+    monkeypatch.undo()
+    count = partial(Pyramid.surfels_for, None)
+    assert [count(full) for full in (0, 2, 1e4, 1e5, 1e9)] == [1000, 1000, 5000, 50_000, 200_000]
+    assert [count(1e9, alone) for alone in (200_000, 5000, 3)] == [50_000, 1250, 1000]
 
 
 def test_the_same_again_and_only_what_has_changed(
@@ -189,7 +207,7 @@ def test_the_same_again_and_only_what_has_changed(
 def made_alone(at: World, node: Node, folder: Path) -> FloatArray:
     """(n, 3) metres in the scene's frame: the surfels of a square."""
     own = at.pyramid.stand(node)
-    every = standing(at.pyramid, node, own)
+    every, _ = standing(at.pyramid, node, own)
     path = folder / "one.glb"
     path.write_bytes(plants_tile(at.pyramid, at.shared, node, every, len(own)).data)
     return np.asarray(read_surfel_set(path).position + at.pyramid.origin(node))
@@ -218,6 +236,14 @@ def test_what_lies_where_nothing_stands_stays_with_its_foot(tmp_path: Path) -> N
     tree = at.pyramid.tree
     (node,) = tree.nodes(tree.depth - 1)
     assert np.ptp(made_alone(at, node, tmp_path)[:, 0]) > 39
+    assert not len(standing(at.pyramid, node, at.pyramid.stand(node))[1])
+    rows = [(31.0, 8.0, "wall"), (30.0, 9.0, "wall"), (60.0, 8.0, "bush")]
+    beside = world(tmp_path / "beside", rows, wall=WALL, bush=BUSH)
+    tree = beside.pyramid.tree
+    west, _ = tree.nodes(tree.depth - 1)
+    assert np.ptp(made_alone(beside, west, tmp_path)[:, 0]) < 25
+    cells = standing(beside.pyramid, west, beside.pyramid.stand(west))[1]
+    assert cells.tolist() == [[1, 0]], "which is told to the journal, as nothing on it has changed"
 
 
 def test_one_triangle_that_is_hardly_seen_has_a_surfel(tmp_path: Path) -> None:

@@ -188,7 +188,7 @@ def _digest(scene: Scene, pyramid: Pyramid) -> str:
         for kind, one in enumerate(pyramid.species)
         for level in range(len(one.levels))
     ]
-    return key_of(*map(_contents, files), *levels)
+    return key_of(*map(_contents, files), *levels, *(one.digest for one in pyramid.samples))
 
 
 def _contents(path: Path) -> str:
@@ -312,12 +312,13 @@ def _sampled(world: World, job: Job, node: Node, stand: Stand) -> Made:
     from vegtool.tiles.surfel_squares import plants_tile, standing
 
     pyramid, own = world.pyramid, len(stand)
-    every = standing(pyramid, node, stand)
+    every, beside = standing(pyramid, node, stand)
     key = key_of(
         SURFELS, pyramid.options.plain, own,
         *(pyramid.samples[kind].digest for kind in sorted(set(every.species.tolist()))),
         *(repr(pyramid.of_level[kind, 0]) for kind in sorted(set(every.species.tolist()))),
         every.foot - pyramid.origin(node), every.species, every.scale, every.yaw, every.tint,
+        beside,
     )  # fmt: skip
     there = job.entry(str(node), key, world.out)
     if there is not None:

@@ -115,9 +115,11 @@ class Pyramid:
         repeat its textures, which merged groups cannot."""
         return 0 if height == 0 else 1
 
-    def surfels_for(self, full: float) -> int:
-        """How many stand for plants of so many triangles in full, if as many are seen."""
-        return int(np.clip(full // 2, FEWEST, MOST))
+    def surfels_for(self, full: float, alone: int | None = None) -> int:
+        """How many stand for plants of so many triangles in full, if as many are seen; a quarter of
+        those of a square's only quarter, where it has one alone."""
+        most = MOST if alone is None else min(MOST, max(FEWEST, alone // 4))
+        return int(np.clip(full // 2, FEWEST, most))
 
     def budget(self, node: Node) -> int:
         """Triangles of a square, at most: fewer where there are fewer tiles on it."""

@@ -23,7 +23,8 @@ from vegtool.formats.gltf_tile import surfels_glb
 from vegtool.surfel_set import SurfelSet
 from vegtool.surfels.blue.group import Discs, covering, discs_of, grouped, together
 from vegtool.tiles.make import Tile
-from vegtool.tiles.pyramid import FEWEST, Pyramid
+from vegtool.tiles.placement import LongArray
+from vegtool.tiles.pyramid import Pyramid
 from vegtool.tiles.quadtree import Node
 from vegtool.tiles.shared import Shared
 from vegtool.tiles.stand import Stand, stand_on
@@ -34,18 +35,18 @@ LONG = 0.5
 CANDIDATES = 5
 """For each surfel of a square, of its plants, at most: what is seen of them, mostly a third, is
 still more than there are surfels."""
-
 LEAST = 1e-9
 """Scale of a plant: none counts as less."""
 
 Bools = npt.NDArray[np.bool_]
 
 
-def standing(pyramid: Pyramid, node: Node, stand: Stand) -> Stand:
-    """The plants that surfels of a square may be of: those on it, then long ones beside it."""
-    long = _long(pyramid, node)
+def standing(pyramid: Pyramid, node: Node, stand: Stand) -> tuple[Stand, LongArray]:
+    """The plants that surfels of a square may be of: those on it, then long ones beside it; and
+    (n, 2) columns and rows, from the square's on, of those beside it that these may lie on."""
+    long, none = _long(pyramid, node), np.zeros((0, 2), np.int64)
     if not long.any():
-        return stand
+        return stand, none
     tiles, tree = pyramid.placement.tiles, pyramid.tree
     reach = float(pyramid.reach_m[long].max())
     half, middle = tree.side(node.level) / 2, tree.middle(node)
@@ -54,15 +55,17 @@ def standing(pyramid: Pyramid, node: Node, stand: Stand) -> Stand:
     near: np.ndarray = np.asarray(within.all(axis=1))
     near[tree.tiles_of(node)] = False
     if not near.any():
-        return stand
+        return stand, none
+    cells = tree.cell[near] >> tree.height(node.level)
     beside = stand_on(pyramid.placement, np.flatnonzero(near), pyramid.species)
     kept = long[beside.species]
-    return Stand(
+    every = Stand(
         *(
             np.concatenate([getattr(stand, item.name), getattr(beside, item.name)[kept]])
             for item in fields(Stand)
         )
     )
+    return every, np.unique(cells, axis=0) - [node.column, node.row]
 
 
 def plants_tile(pyramid: Pyramid, shared: Shared, node: Node, stand: Stand, own: int) -> Tile:
@@ -80,18 +83,19 @@ def plants_tile(pyramid: Pyramid, shared: Shared, node: Node, stand: Stand, own:
         wanted = CANDIDATES * count
         scales = [stand.scale[stand.species == kind] for kind in kinds]
         metres = _spaced(sets, scales, wanted)
-        parts = list[Discs]()
+        parts, whole = list[Discs](), list[Discs]()
         for kind, surfels in zip(kinds, sets, strict=True):
             which = np.flatnonzero(stand.species == kind)
-            every = _placed(stand, which, surfels, metres, pyramid.origin(node))
-            if not long[kind]:
-                parts.append(every[0])
-                continue
-            place = every[0].position + pyramid.origin(node)
-            parts.append(every[0].of(_lies_on(pyramid, node, place, which[every[1]] < own)))
+            every, plant = _placed(stand, which, surfels, metres, pyramid.origin(node))
+            if long[kind]:
+                here = which[plant] < own
+                whole.append(every.of(here))
+                place = every.position + pyramid.origin(node)
+                every = every.of(_lies_on(pyramid, node, place, here))
+            parts.append(every)
+        if not any(map(len, parts)):  # all that stands here lies elsewhere
+            parts = whole
         discs = together(parts)
-        if not len(discs):  # all that stands here lies elsewhere
-            discs = every[0].of(which[every[1]] < own)
     of = _Of(sets, scales, own, full)
     return _tile(pyramid, node, discs, count, of, 0.0, seconds)
 
@@ -110,9 +114,7 @@ def quarters_tile(
     Raises CapabilityError where nothing can draw.
     """
     seconds: dict[str, float] = {}
-    count = pyramid.surfels_for(full)
-    if len(quarters) == 1:
-        count = max(FEWEST, min(count, len(quarters[0][1]) // 4))
+    count = pyramid.surfels_for(full, len(quarters[0][1]) if len(quarters) == 1 else None)
     with timed(seconds, "surfels"):
         away = [pyramid.origin(one) - pyramid.origin(node) for one, _ in quarters]
         sets = [one.moved(shift) for (_, one), shift in zip(quarters, away, strict=True)]
