@@ -1,5 +1,6 @@
 """Tiles as .glb files: of a landscape, merged groups, instances of models that tiles share, and
-squares that were clustered anew; of one plant, parts of its billboards and of its surface.
+squares that were clustered anew or are surfels; of one plant, parts of its billboards and of its
+surface.
 
 Sources: glTF 2.0 specification; KHR_mesh_quantization and EXT_mesh_gpu_instancing (extensions,
 Khronos glTF repository). Textures of merged groups, and the vertices of instanced models, are files
@@ -11,16 +12,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from vegtool.arrays import ByteArray, FloatArray
+from vegtool.errors import InputError
 from vegtool.formats import png
 from vegtool.formats.glb import ELEMENT_ARRAY_BUFFER, Document
 from vegtool.formats.gltf import ALPHA_CUTOFF, plant_document
 from vegtool.formats.gltf_material import UNLIT
+from vegtool.formats.gltf_surfels import add_surfels, read_surfel_set
 from vegtool.formats.plant_table import (
     PlantTable,
     add_tables,
@@ -31,6 +35,7 @@ from vegtool.formats.plant_table import (
 from vegtool.formats.shared_model import SharedModel
 from vegtool.lod import Triangles
 from vegtool.plant import Plant
+from vegtool.surfel_set import SurfelSet
 
 QUANTIZATION, INSTANCING = "KHR_mesh_quantization", "EXT_mesh_gpu_instancing"
 STEPS = 65535
@@ -164,6 +169,28 @@ def part_glb(
             raise ValueError("part_glb: expected quads or a mesh")
         return _shown(document, primitives[0], name, {})
     return document.glb()
+
+
+def surfels_glb(surfels: SurfelSet, name: str, plain: bool = False) -> bytes:
+    """A square's surfels, whose positions are in metres from its centre, in progressive order: one
+    node, one mesh, one primitive of points. plain: float32 in place of KHR_mesh_quantization."""
+    document = Document()
+    document.show(add_surfels(document, surfels, name, np.zeros(3), not plain))
+    return document.glb()
+
+
+def read_surfels_tile(path: Path) -> SurfelSet:
+    """What `surfels_glb` wrote, in metres from the tile's origin. Raises InputError for a file that
+    is missing or anything else."""
+    try:
+        return read_surfel_set(path)
+    except InputError as error:
+        reason = str(error).removeprefix(f"{path}: ").removesuffix(" Convert the plant again.")
+        raise InputError(f"{path}: {reason} It is a tile: make the tiles again") from error
+    except OSError as error:
+        raise InputError(
+            f"{path}: cannot be read ({error.strerror}). Make the tiles again"
+        ) from error
 
 
 def _indices(document: Document, group: Triangles) -> dict[str, int]:

@@ -32,7 +32,8 @@ told otherwise."""
 class TileEntry:
     """uri: of its file, or None of a tile without content. origin: (3,) metres in the scene's
     frame, y up. bounds: (2, 3) metres there, least and greatest corner, which hold the children's.
-    error_m: geometric error. plants: on it. feet_m: lowest and highest of where they stand."""
+    error_m: geometric error. plants: on it. feet_m: lowest and highest of where they stand.
+    surfels: that it is drawn as, 0 where it is drawn as anything else."""
 
     uri: str | None
     origin: FloatArray
@@ -41,6 +42,7 @@ class TileEntry:
     plants: int = 0
     feet_m: tuple[float, float] = (0.0, 0.0)
     children: Sequence[TileEntry] = ()
+    surfels: int = 0
 
 
 def tileset_files(
@@ -95,6 +97,8 @@ def _tile(
         "geometricError": tile.error_m,
         "extras": {"plants": tile.plants, "feet_m": [tile.feet_m[0], tile.feet_m[1]]},
     }
+    if tile.surfels:
+        found["extras"]["surfels"] = tile.surfels
     if tile.uri is not None:
         found["content"] = {"uri": tile.uri.removeprefix(folder)}
     children = []

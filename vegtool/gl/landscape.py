@@ -110,8 +110,8 @@ class Landscape(OnGpu):
     ) -> None:
         self.ctx = ctx or context()
         self._plants: dict[int, InstancedPlant] = {}
-        self._surfels: list[SurfelSetBuffers] = []
-        self._added = 0
+        self._surfels: dict[int, SurfelSetBuffers] = {}
+        self._added = self._sets = 0
         self.fading = "pixels" if pixels_fade else "texels"
         self._noise = _noise_texture(self.ctx, noise)
         self._rows = self.ctx.buffer(reserve=INSTANCE.itemsize * 1024, dynamic=True)
@@ -140,13 +140,18 @@ class Landscape(OnGpu):
         return self._added - 1
 
     def add_surfels(self, surfels: SurfelSet) -> int:
-        """Upload a set of surfels; returns its index among sets."""
-        self._surfels.append(SurfelSetBuffers(surfels, ctx=self.ctx))
-        return len(self._surfels) - 1
+        """Upload a set of surfels; returns its index among sets, which no other gets."""
+        self._surfels[self._sets] = SurfelSetBuffers(surfels, ctx=self.ctx)
+        self._sets += 1
+        return self._sets - 1
 
     def surfels(self, index: int) -> SurfelSetBuffers:
         """A set that was added."""
         return self._surfels[index]
+
+    def remove_surfels(self, index: int) -> None:
+        """Free a set."""
+        self._surfels.pop(index).release()
 
     def remove(self, plant: int) -> None:
         """Free one of them; what it shares stays."""
@@ -157,7 +162,7 @@ class Landscape(OnGpu):
         for plant in self._plants.values():
             plant.release()
         self._plants.clear()
-        for surfels in self._surfels:
+        for surfels in self._surfels.values():
             surfels.release()
         self._surfels.clear()
         self._noise.release()

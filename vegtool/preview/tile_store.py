@@ -12,13 +12,15 @@ from __future__ import annotations
 import zlib
 from collections import Counter, OrderedDict
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from weakref import WeakValueDictionary
 
 import numpy as np
 
+from vegtool.arrays import FloatArray
 from vegtool.elements import unordered
+from vegtool.formats.gltf_tile import read_surfels_tile
 from vegtool.gl.context import OnGpu
 from vegtool.gl.instances import INSTANCE, WHOLE, InstancedPlant
 from vegtool.gl.landscape import Landscape
@@ -30,6 +32,8 @@ from vegtool.preview.tileset import Copies, Tileset, read_model, read_tile
 MOST_BYTES = 1 << 30
 """Bytes that are kept, on the GPU and beside it; more where what is drawn is more."""
 TEXEL_BYTES = 4
+SURFEL_BYTES = 9 * (4 + 8)
+"""On the GPU, and beside it."""
 Key = tuple[int, bool, float | None]
 """Of a texture among Textures."""
 ALL_TEXELS = (2.0, 1.0, 1.0)
@@ -40,17 +44,21 @@ ALL_TEXELS = (2.0, 1.0, 1.0)
 class Held:
     """A tile on the GPU: rows of INSTANCE, places relative to the tile's origin, of each model.
     models: their indices in the landscape. files: where they were read. kinds: numbers of their
-    species; 0 where several are merged."""
+    species; 0 where several are merged. surfels: index in the landscape of the set that is drawn in
+    place of models, or None. bounds: (2, 3) metres from the tile's origin, of those."""
 
-    rows: tuple[np.ndarray, ...]
-    models: tuple[int, ...]
-    files: tuple[Path, ...]
-    kinds: tuple[int, ...]
+    rows: tuple[np.ndarray, ...] = ()
+    models: tuple[int, ...] = ()
+    files: tuple[Path, ...] = ()
+    kinds: tuple[int, ...] = ()
+    surfels: int | None = None
+    bounds: FloatArray = field(default_factory=lambda: np.zeros((2, 3)))
+    surfel_bytes: int = 0
 
     @property
     def bytes(self) -> int:
-        """Of its rows alone."""
-        return sum(rows.nbytes for rows in self.rows)
+        """Of its rows alone, and of its surfels."""
+        return sum(rows.nbytes for rows in self.rows) + self.surfel_bytes
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +123,13 @@ class TileStore(OnGpu):
     def _load(self, tile: int) -> None:
         file = self.tileset.file[tile]
         assert file is not None, "only tiles with content are drawn"
+        if self.tileset.surfels[tile]:
+            surfels = read_surfels_tile(Path(file))
+            index = self.landscape.add_surfels(surfels)
+            size = SURFEL_BYTES * len(surfels)
+            self._held[tile] = Held(surfels=index, bounds=surfels.bounds, surfel_bytes=size)
+            self.bytes += size
+            return
         copies = read_tile(Path(file), self._model)
         models = tuple(self._uploaded(one) for one in copies)
         held = Held(
@@ -132,6 +147,8 @@ class TileStore(OnGpu):
         while self.bytes > MOST_BYTES and (tile := next(iter(self._held))) not in needed:
             held = self._held.pop(tile)
             self.bytes -= held.bytes
+            if held.surfels is not None:
+                self.landscape.remove_surfels(held.surfels)
             self._users.subtract(held.files)
             for file in set(held.files):
                 if not self._users[file]:

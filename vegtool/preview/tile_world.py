@@ -37,7 +37,11 @@ class TileWorld:
     sun: Sun | None = None
     way: Path | None = None
     orbited: bool = False
-    progressive: bool = False
+
+    @property
+    def progressive(self) -> bool:
+        """Whether any tile is surfels."""
+        return bool(self.tileset.surfels.any())
 
     def height_at(self, x: float, z: float) -> float:
         """Metres: of the feet on the smallest tile there."""
@@ -55,7 +59,9 @@ class TileWorld:
             if here.any():
                 away = tiles.error_m[here].max() * focal_px / tiles.seen_px
                 level, count = tiles.deepest - depth, int(here.sum())
-                found.append(f"level {level}: {count:,} tiles, drawn from {away:,.3g} m")
+                many = int(tiles.surfels[here].sum())
+                of = f", {many:,} surfels" if many else ""
+                found.append(f"level {level}: {count:,} tiles{of}, drawn from {away:,.3g} m")
         return found
 
 

@@ -46,7 +46,8 @@ class Tileset:
     origin: (t, 3) metres. low, high: (t, 3) metres, of their boxes. error_m: (t,). children: (t, 2)
     int64, the first of each, and the one after the last. plants: (t,) int64, that stand on each.
     feet_m: (t, 2), the lowest and highest of their feet. depth: (t,) int64, of each below the root.
-    seen_px: pixels that errors are to be seen as.
+    surfels: (t,) int64, that each is drawn as, 0 of others. seen_px: pixels that errors are to be
+    seen as.
     """
 
     file: tuple[str | None, ...]  # half a million paths would take seconds
@@ -58,6 +59,7 @@ class Tileset:
     plants: LongArray
     feet_m: FloatArray
     depth: LongArray
+    surfels: LongArray
     seen_px: float = CLIENT_PX
 
     @cached_property
@@ -157,6 +159,7 @@ class _Part:
     plants: LongArray
     feet_m: FloatArray
     depth: LongArray
+    surfels: LongArray
     outside: list[_Outside]
     end: int
     seen_px: float
@@ -225,6 +228,7 @@ def _tiles_of(at: _Outside, root: dict[str, Any], free: int) -> _Part:
         np.array([tile["extras"]["plants"] for tile, _, _ in shown], np.int64),
         _numbers([tile["extras"]["feet_m"] for tile, _, _ in shown], 2),
         numbers[:, 1],
+        np.array([tile["extras"].get("surfels", 0) for tile, _, _ in shown], np.int64),
         outside,
         free,
         seen_px,
@@ -267,6 +271,7 @@ def _joined(parts: Sequence[_Part]) -> Tileset:
         joined("plants"),
         joined("feet_m"),
         joined("depth"),
+        joined("surfels"),
         parts[0].seen_px,
     )
 

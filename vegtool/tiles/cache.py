@@ -1,7 +1,8 @@
 """What is made of plants once, and kept in the library under a hash of all that it is made from.
 
-LIBRARY/.vegtool/HASH/ holds a chain of levels as `write_chain` writes it, whole, or is not there:
-it is filled under another name first. Whoever comes second leaves what the first one made.
+LIBRARY/.vegtool/HASH/ holds a chain of levels as `write_chain` writes it, or surfels (samples.py),
+whole, or is not there: it is filled under another name first. Whoever comes second leaves what the
+first one made.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 import json
 import secrets
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path
@@ -63,11 +64,14 @@ def kept(place: Path) -> Path | None:
 
 
 @contextmanager
-def filling(place: Path, source: Path, by_hand: str) -> Iterator[Path]:
+def filling(
+    place: Path, source: Path, by_hand: str, whole: Callable[[Path], object] = kept
+) -> Iterator[Path]:
     """A folder to write into, which stands at `place` when the `with` block ends without an
     exception, unless another process has put one there.
 
-    Raises OutputError where it cannot be made; by_hand: what the user can do to do without.
+    Raises OutputError where it cannot be made; by_hand: what the user can do to do without. whole:
+    whether a folder has all that it is to have; a chain, unless told otherwise.
     """
     part = place.with_name(f"{place.name}.{secrets.token_hex(6)}{PART}")
     try:
@@ -79,20 +83,20 @@ def filling(place: Path, source: Path, by_hand: str) -> Iterator[Path]:
         ) from error
     try:
         yield part
-        _move_in(part, place)
+        _move_in(part, place, whole)
     finally:
         shutil.rmtree(part, ignore_errors=True)
 
 
-def _move_in(part: Path, place: Path) -> None:
-    if kept(place) is not None:
+def _move_in(part: Path, place: Path, whole: Callable[[Path], object] = kept) -> None:
+    if whole(place):
         return
     shutil.rmtree(place, ignore_errors=True)  # what somebody has taken files from
     try:
         with explained(place):
             part.replace(place)
     except OutputError:
-        if kept(place) is None:  # nor did another process put it there meanwhile
+        if not whole(place):  # nor did another process put it there meanwhile
             raise
 
 

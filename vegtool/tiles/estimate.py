@@ -16,6 +16,7 @@ from vegtool.console import human_bytes, table
 from vegtool.errors import VegtoolError
 from vegtool.progress import Progress
 from vegtool.tiles.jobs import TILES, Failed, Made, SheetJob, World, do
+from vegtool.tiles.pyramid import MOST
 from vegtool.tiles.run import blocks, models
 from vegtool.tiles.shared import Shared
 
@@ -24,6 +25,9 @@ FAR_S = 5.0
 FAR_TRIANGLES = 65_536
 FAR_BYTES = 60.0
 """Bytes of such a square for each triangle."""
+SURFELS_S = 7.0
+"""Seconds of one core for a square of MOST surfels, made of its quarters'."""
+SURFEL_BYTES = 20.0
 
 
 def estimated(world: World, processes: int, progress: Progress) -> tuple[dict[str, Any], str]:
@@ -61,6 +65,8 @@ def _estimated(world: World, processes: int, progress: Progress) -> tuple[dict[s
             own = [m for m in found if tree.height(int(m.entry.name.split("/")[0])) == height]
             size = times * sum(sum(m.entry.files.values()) for m in own)
             seconds = times * sum(sum(m.seconds.values()) for m in own)
+        elif pyramid.options.surfels:
+            size, seconds = SURFEL_BYTES * MOST * len(nodes), SURFELS_S * len(nodes)
         else:
             triangles = sum(pyramid.budget(node) for node in nodes)
             size, seconds = FAR_BYTES * triangles, FAR_S * triangles / FAR_TRIANGLES

@@ -24,6 +24,7 @@ from vegtool.errors import (
     unknown,
 )
 from vegtool.formats import read_plant
+from vegtool.formats.gltf_tile import read_surfels_tile
 from vegtool.progress import Progress, silent
 from vegtool.scene import Scene
 from vegtool.tiles.journal import Entry, Hashed, key_of, write_file
@@ -46,6 +47,8 @@ from vegtool.workers import check_stop
 
 TILES = "tiles"
 """Folder of the tiles, in that of the tileset."""
+SURFELS = "surfels"
+"""Kind of squares."""
 
 
 FATAL = (OutputError, UsageError, CapabilityError)
@@ -185,7 +188,7 @@ def _digest(scene: Scene, pyramid: Pyramid) -> str:
         for kind, one in enumerate(pyramid.species)
         for level in range(len(one.levels))
     ]
-    return key_of(*map(_contents, files), *levels)
+    return key_of(*map(_contents, files), *levels, *(one.digest for one in pyramid.samples))
 
 
 def _contents(path: Path) -> str:
@@ -293,6 +296,8 @@ def _placed(world: World, job: Job, node: Node, stand: Stand) -> Made:
     if not len(stand):
         return Made(Entry(name, key_of("none"), {}, {"plants": 0}), again=False)
     near = pyramid.instanced(pyramid.tree.height(node.level))
+    if pyramid.options.surfels and not near:
+        return _sampled(world, job, node, stand)
     how = chosen(pyramid, world.shared, node, stand)
     key = _stand_key(world, node, stand, how)
     there = job.entry(name, key, world.out)
@@ -300,6 +305,48 @@ def _placed(world: World, job: Job, node: Node, stand: Stand) -> Made:
         return Made(there, again=False)
     make = instanced_tile if near else merged_tile
     return _written(world, make(pyramid, world.shared, node, stand, how.level), key)
+
+
+def _sampled(world: World, job: Job, node: Node, stand: Stand) -> Made:
+    """Surfels of the plants that stand on it, one at least."""
+    from vegtool.tiles.surfel_squares import plants_tile, standing
+
+    pyramid, own = world.pyramid, len(stand)
+    every, beside = standing(pyramid, node, stand)
+    key = key_of(
+        SURFELS, pyramid.options.plain, own,
+        *(pyramid.samples[kind].digest for kind in sorted(set(every.species.tolist()))),
+        *(repr(pyramid.of_level[kind, 0]) for kind in sorted(set(every.species.tolist()))),
+        every.foot - pyramid.origin(node), every.species, every.scale, every.yaw, every.tint,
+        beside,
+    )  # fmt: skip
+    there = job.entry(str(node), key, world.out)
+    if there is not None:
+        return Made(there, again=False)
+    return _written(world, plants_tile(pyramid, world.shared, node, every, own), key)
+
+
+def _of_quarters(world: World, job: FarJob, quarters: Sequence[tuple[Node, Entry]]) -> Made:
+    """Surfels of what its quarters' files hold."""
+    from vegtool.tiles.surfel_squares import quarters_tile
+
+    pyramid, node, name = world.pyramid, job.node, str(job.node)
+    if not quarters:
+        return Made(Entry(name, key_of("none"), {}, {"plants": 0}), again=False)
+    key = key_of(
+        SURFELS, pyramid.options.plain, *(entry.key for _, entry in quarters),
+        *(pyramid.origin(one) - pyramid.origin(node) for one, _ in quarters),
+    )  # fmt: skip
+    there = job.entry(name, key, world.out)
+    if there is not None:
+        return Made(there, again=False)
+    seconds: dict[str, float] = {}
+    with timed(seconds, "quarters"):
+        read = [(one, read_surfels_tile(world.out / file_of(one))) for one, _ in quarters]
+    plants, full = (sum(e.facts[what] for _, e in quarters) for what in ("plants", "full"))
+    below_m = max(entry.facts["error_m"] for _, entry in quarters)
+    tile = quarters_tile(pyramid, node, read, plants, full, below_m)
+    return _written(world, replace(tile, seconds={**seconds, **tile.seconds}), key)
 
 
 def _tile(world: World, job: TileJob) -> Iterator[Outcome]:
@@ -321,6 +368,9 @@ def _far(world: World, job: FarJob) -> Iterator[Outcome]:
     if lost:
         raise InputError(f"is made of its quarters, of which {', '.join(lost)} failed")
     quarters = [(one, entry) for one, entry in job.quarters if entry and entry.facts["plants"]]
+    if pyramid.options.surfels:
+        yield _of_quarters(world, job, quarters)
+        return
     if all(entry.facts["kind"] != "reclustered" for _, entry in quarters):
         with timed(seconds, "placement"):
             stand = pyramid.stand(node)
@@ -365,6 +415,8 @@ def _written(world: World, tile: Tile, key: str) -> Made:
         "error_m": tile.error_m,
         "bounds": None if tile.bounds is None else (tile.bounds - origin).tolist(),
     }
+    if tile.kind == SURFELS:
+        facts |= {"surfels": tile.surfels, "full": tile.full}
     return Made(Entry(str(tile.node), key, {file: len(tile.data)}, facts), True, tile.seconds)
 
 

@@ -34,7 +34,8 @@ class Tile:
     """data: of its .glb file. plants: on the square. triangles, draws: what a client draws. kind:
     how it was made. error_m: how far from its place anything is drawn, for 95 % of it; None where
     that was not measured. bounds: (2, 3) metres in the scene's frame, where what is drawn may reach
-    beyond the plants. seconds: by step."""
+    beyond the plants. surfels: points that it is drawn as. full: triangles of the plants that these
+    stand for, in full. seconds: by step."""
 
     node: Node
     data: bytes
@@ -44,6 +45,8 @@ class Tile:
     draws: int
     error_m: float | None = None
     bounds: FloatArray | None = None
+    surfels: int = 0
+    full: int = 0
     seconds: dict[str, float] = field(default_factory=dict)
 
 
@@ -176,5 +179,5 @@ def reclustered_tile(
     error = below_m + (0.0 if level.geometric_error_m is None else level.geometric_error_m[1])
     return Tile(
         node, data, "reclustered", plants, level.triangles, 1, error,
-        client_plant(level).bounds + origin, seconds,
+        client_plant(level).bounds + origin, seconds=seconds,
     )  # fmt: skip

@@ -35,6 +35,10 @@ class TileOptions:
     plain: bool = option(
         False, "Vertices of merged tiles as floats, for clients without KHR_mesh_quantization."
     )
+    surfels: bool = option(
+        False, "Beyond the levels of instances, squares as points in progressive order "
+        "(progressive blue surfels), in place of merged meshes."
+    )  # fmt: skip
     attributes: bool = option(
         False, "Write which plant is which, of what species and how high, for clients that ask "
         "(EXT_structural_metadata)."

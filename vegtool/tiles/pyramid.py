@@ -27,6 +27,8 @@ from vegtool.tiles.options import TileOptions
 from vegtool.tiles.placement import Placement, placement_of
 from vegtool.tiles.prepare import prepare
 from vegtool.tiles.quadtree import Node, Quadtree, quadtree_of
+from vegtool.tiles.samples import Sample, samples_of
+from vegtool.tiles.species import folder_of
 from vegtool.tiles.stand import Stand, stand_on
 from vegtool.tiles.terrain import terrain_of
 
@@ -38,11 +40,14 @@ HANDFUL = 16
 """Triangles of a square so far away that it needs no square beyond."""
 PER_PLANT = 4
 """Triangles that are enough of any plant from afar."""
+FEWEST, MOST = 1_000, 200_000
+"""Surfels of a square."""
 
 
 @dataclass(frozen=True, eq=False)
 class Pyramid:
-    """display: of the client that tiles are made for."""
+    """display: of the client that tiles are made for. samples: of species, where squares are
+    surfels."""
 
     placement: Placement
     species: tuple[Species, ...]
@@ -50,6 +55,7 @@ class Pyramid:
     options: TileOptions
     display: Display
     notes: tuple[str, ...] = ()
+    samples: tuple[Sample, ...] = ()
     _digests: dict[tuple[int, int], str] = field(default_factory=dict, repr=False)
 
     @cached_property
@@ -109,6 +115,12 @@ class Pyramid:
         repeat its textures, which merged groups cannot."""
         return 0 if height == 0 else 1
 
+    def surfels_for(self, full: float, alone: int | None = None) -> int:
+        """How many stand for plants of so many triangles in full, if as many are seen; a quarter of
+        those of a square's only quarter, where it has one alone."""
+        most = MOST if alone is None else min(MOST, max(FEWEST, alone // 4))
+        return int(np.clip(full // 2, FEWEST, most))
+
     def budget(self, node: Node) -> int:
         """Triangles of a square, at most: fewer where there are fewer tiles on it."""
         covered = len(self.tree.tiles_of(node)) / 4.0 ** self.tree.height(node.level)
@@ -140,16 +152,19 @@ class Pyramid:
         return np.asarray(np.where(alone, known, np.fmax(1.0, known)))
 
     @cached_property
+    def reach_m(self) -> FloatArray:
+        """(s,) metres to a side of its foot that no plant of each species reaches beyond."""
+        aside = [np.abs(one.bounds[:, :, [0, 2]]).max(axis=(0, 1)) for one in self.species]
+        return np.asarray(self.largest * np.hypot(*np.array(aside).T))
+
+    @cached_property
     def _around(self) -> FloatArray:
         """(2, 3) metres around a foot that no plant is beyond, however it is turned."""
         found = np.zeros((2, 3))
-        for one, scale in zip(self.species, self.largest, strict=True):
-            bounds = one.bounds
-            low, high = scale * bounds[:, 0].min(axis=0), scale * bounds[:, 1].max(axis=0)
-            side = np.abs(np.stack([low, high]))[:, [0, 2]].max(axis=0)
-            aside = float(np.hypot(*side))
-            found[0] = np.minimum(found[0], [-aside, low[1], -aside])
-            found[1] = np.maximum(found[1], [aside, high[1], aside])
+        for one, scale, aside in zip(self.species, self.largest, self.reach_m, strict=True):
+            low, high = scale * one.bounds[:, 0, 1].min(), scale * one.bounds[:, 1, 1].max()
+            found[0] = np.minimum(found[0], [-aside, low, -aside])
+            found[1] = np.maximum(found[1], [aside, high, aside])
         return found
 
     def finest_at(self, height: int, times: float = 1.0) -> list[int]:
@@ -185,16 +200,22 @@ def pyramid_of(
         )
     found = prepare(scene, placement, library, workers, lambda s, f: progress(s, (1 + f) / 2))
     placement = found.placement
+    samples: tuple[Sample, ...] = ()
+    if options.surfels:
+        folder = folder_of(library)
+        samples = samples_of(found.species, folder, workers, lambda s, f: progress(s, 1.0))
     tree = quadtree_of(placement.tiles, placement.tile_m, _above(placement, options))
     notes = (*terrain.notes, *placement.notes, *notes_on(terrain, placement), *found.notes)
-    return Pyramid(placement, found.species, tree, options, Display(), notes)
+    return Pyramid(placement, found.species, tree, options, Display(), notes, samples)
 
 
 def _above(placement: Placement, options: TileOptions) -> int:
     """Levels above the least square that holds all tiles, until a handful of triangles is enough of
-    it."""
+    it, or the fewest surfels."""
     least = quadtree_of(placement.tiles, placement.tile_m)
     covered = len(placement.tiles) / 4.0**least.depth
+    if options.surfels:
+        return ceil(log(MOST / FEWEST, 4))
     wanted = min(covered * options.triangles, PER_PLANT * float(placement.tiles.count.sum()))
     return max(0, ceil(log(wanted / HANDFUL, 4)))
 

@@ -25,6 +25,7 @@ def facts_of(
                 key: one.entry.facts[key]
                 for key in ("kind", "plants", "triangles", "draws", "error_m")
             },
+            "surfels": one.entry.facts.get("surfels", 0),
             "bytes": sum(one.entry.files.values()),
             "again": one.again,
             "seconds": {key: round(value, 4) for key, value in one.seconds.items()},
@@ -50,14 +51,14 @@ def facts_of(
 
 def text_of(facts: Mapping[str, Any]) -> str:
     """The same, in few words."""
-    head = ["tiles of", "tiles", "drawn as", "from", "triangles", "error", "bytes", "seconds"]
+    head = ["tiles of", "tiles", "drawn as", "from", "of", "error", "bytes", "seconds"]
     rows = [
         [
             f"{level['side_m']:,.4g} m",
             f"{level['tiles']:,}",
             ", ".join(level["kinds"]),
             f"{level['from_m']:,.4g} m",
-            f"{level['most_triangles']:,}",
+            _drawn(level),
             f"{level['error_m']:.2g} m",
             human_bytes(level["bytes"]),
             f"{level['seconds']:,.1f}",
@@ -78,6 +79,13 @@ def _node(one: Made) -> Node:
     return Node(*map(int, one.entry.name.split("/")))
 
 
+def _drawn(level: Mapping[str, Any]) -> str:
+    """Of how much its tiles are, at most."""
+    if level["most_surfels"]:
+        return f"{level['most_surfels']:,} surfels"
+    return f"{level['most_triangles']:,} triangles"
+
+
 def _level(world: World, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """What squares of one height come to."""
     height = rows[0]["height"]
@@ -89,6 +97,7 @@ def _level(world: World, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "kinds": sorted({row["kind"] for row in rows}),
         "plants": sum(row["plants"] for row in rows),
         "triangles": sum(row["triangles"] for row in rows),
+        "most_surfels": max(row["surfels"] for row in rows),
         "most_triangles": max(row["triangles"] for row in rows),
         "error_m": world.pyramid.error_m(height),
         "measured_error_m": max((row["error_m"] or 0.0) for row in rows),

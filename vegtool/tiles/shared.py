@@ -19,6 +19,7 @@ from vegtool.errors import InputError
 from vegtool.formats import png
 from vegtool.formats.gltf_tile import SheetFiles
 from vegtool.formats.shared_model import SharedModel, model_files, plain_name, read_shared
+from vegtool.surfel_set import SurfelSet
 from vegtool.tiles.levels import COARSEST, fitting
 from vegtool.tiles.pyramid import Pyramid, used_levels
 from vegtool.tiles.quadtree import Node
@@ -58,6 +59,7 @@ class Shared:
         self.pyramid, self.folder = pyramid, folder
         self._models: dict[tuple[int, int], SharedModel] = {}
         self._sheets: dict[int, MergedSheet] = {}
+        self._samples: dict[int, SurfelSet] = {}
         self._crowded: dict[int, float] = {}
 
     @cached_property
@@ -87,6 +89,12 @@ class Shared:
                     f"expected {file}, which it draws, found none: that could not be made"
                 ) from error
         return self._models[kind, level]
+
+    def sample(self, kind: int) -> SurfelSet:
+        """The surfels of a species. Raises InputError for a file that is missing or broken."""
+        if kind not in self._samples:
+            self._samples[kind] = self.pyramid.samples[kind].read()
+        return self._samples[kind]
 
     def crowded(self, height: int) -> float:
         """How many times farther away than they are the plants of merged squares of a height are

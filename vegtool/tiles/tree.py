@@ -57,6 +57,7 @@ def _entry(pyramid: Pyramid, node: Node, found: Mapping[str, Entry]) -> TileEntr
         sum(c.plants for c in below) if own is None else own.facts["plants"],
         (float(tiles.low[which, 1].min()), float(tiles.high[which, 1].max())),
         children,
+        0 if own is None else own.facts.get("surfels", 0),
     )
 
 
