@@ -11,7 +11,7 @@ from surfel_sets import ball
 from vegtool.errors import UsageError
 from vegtool.surfel_set import Spacing, SurfelSet
 from vegtool.surfels.blue.distances import nearest
-from vegtool.surfels.blue.group import Discs, covering, discs_of, grouped, outside, together
+from vegtool.surfels.blue.group import Discs, discs_of, grouped, outside, together
 
 pytestmark = pytest.mark.gl
 
@@ -54,7 +54,7 @@ def test_early_surfels_have_means_of_what_they_stand_for() -> None:
 
 def test_few_and_copies() -> None:
     """One disc is one surfel, of no extent; copies come last, if at all."""
-    one = Discs(np.ones((1, 3)), np.eye(3)[:1], np.ones((1, 3)), np.zeros(1))
+    one = Discs(np.ones((1, 3)), np.eye(3)[:1], np.ones((1, 3)), np.zeros(1), np.ones(1))
     assert len(grouped(one, 1000).surfels) == 1
     same = together([one, one, one])
     assert 1 <= len(grouped(same, 1000).surfels) <= 3
@@ -64,27 +64,20 @@ def test_few_and_copies() -> None:
         grouped(one, -1)
 
 
-def test_factors_of_radii_are_those_of_the_parts() -> None:
-    """At the same radius: a ball of twice the scale has four times as many there, so factors that
-    double with four times the prefix are twice as large; of parts, the larger one's counts for
-    more. Where all are 1, so is the group's."""
-    plain = ball(1000)
-    steep = replace(plain, covering=2.0 ** (np.arange(11) / 2))
-    one, double = np.ones(1), np.full(1, 2.0)
-    alone = covering([steep], [one], plain.spacing)
-    assert np.allclose(alone[:-1], steep.covering[:-1], rtol=0.01)
-    larger = covering([steep], [double], plain.spacing)
-    assert np.allclose(larger[:-3], 2 * alone[:-3], rtol=0.03)
-    both = covering([steep, plain], [one, double], plain.spacing)
-    assert np.allclose(both**2, (alone**2 + 4) / 5)
-    assert covering([plain, plain], [one, double], plain.spacing).tolist() == [1.0]
+def test_surfels_keep_their_sizes() -> None:
+    """Those of a ball that were half as large as the rest are so in a group."""
+    one = ball(1000)
+    small = one.position[:, 0] > 0
+    sized = replace(one, size=np.where(small, 0.5, 1.0))
+    made = grouped(discs_of(sized), 300).surfels
+    assert np.array_equal(made.size, np.where(made.position[:, 0] > 0, 0.5, 1.0))
 
 
 def test_discs_are_as_large_as_they_are_drawn() -> None:
-    """Of a set with a factor of its radii, by that."""
+    """Of a set with sizes, by these."""
     one = ball(100)
-    wider = SurfelSet(one.position, one.normal, one.color, one.spacing, np.full(8, 2.0))
-    assert np.allclose(discs_of(wider).radius, 2 * discs_of(one).radius)
+    smaller = SurfelSet(one.position, one.normal, one.color, one.spacing, np.full(100, 0.5))
+    assert np.allclose(discs_of(smaller).radius, 0.5 * discs_of(one).radius)
     assert np.allclose(discs_of(one).radius, one.spacing.radius(100))
     lonely = SurfelSet(np.zeros((1, 3)), np.eye(3)[:1], np.ones((1, 3)), Spacing(1, 0.0, 1))
     assert discs_of(lonely).radius.tolist() == [0.0]

@@ -13,7 +13,7 @@ as near as their nearest end is; they are split, and each surfel is on the squar
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +21,7 @@ import numpy.typing as npt
 from vegtool.arrays import FloatArray, IntArray
 from vegtool.formats.gltf_tile import surfels_glb
 from vegtool.surfel_set import SurfelSet
-from vegtool.surfels.blue.group import Discs, covering, discs_of, grouped, together
+from vegtool.surfels.blue.group import Discs, discs_of, grouped, together
 from vegtool.tiles.make import Tile
 from vegtool.tiles.placement import LongArray
 from vegtool.tiles.pyramid import Pyramid
@@ -96,7 +96,7 @@ def plants_tile(pyramid: Pyramid, shared: Shared, node: Node, stand: Stand, own:
         if not any(map(len, parts)):  # all that stands here lies elsewhere
             parts = whole
         discs = together(parts)
-    of = _Of(sets, scales, own, full)
+    of = _Of(sets, own, full)
     return _tile(pyramid, node, discs, count, of, 0.0, seconds)
 
 
@@ -119,16 +119,15 @@ def quarters_tile(
         away = [pyramid.origin(one) - pyramid.origin(node) for one, _ in quarters]
         sets = [one.moved(shift) for (_, one), shift in zip(quarters, away, strict=True)]
         discs = together([discs_of(one) for one in sets])
-    of = _Of(sets, [np.ones(1)] * len(sets), plants, full)
+    of = _Of(sets, plants, full)
     return _tile(pyramid, node, discs, count, of, below_m, seconds)
 
 
 @dataclass(frozen=True, eq=False)
 class _Of:
-    """What a square is made of: sets, at which scales each, plants, and their triangles in full."""
+    """What a square is made of: sets, plants, and their triangles in full."""
 
     sets: Sequence[SurfelSet]
-    scales: Sequence[FloatArray]
     plants: int
     full: int
 
@@ -138,9 +137,10 @@ def _tile(
     seconds: dict[str, float],
 ) -> Tile:  # fmt: skip
     with timed(seconds, "order"):
-        made = grouped(discs, count, unlit=all(one.unlit for one in of.sets))
-        covers = covering(of.sets, of.scales, made.surfels.spacing)
-    surfels = replace(made.surfels, covering=covers)
+        unlit = all(one.unlit for one in of.sets)
+        double_sided = any(one.double_sided for one in of.sets)
+        made = grouped(discs, count, unlit=unlit, double_sided=double_sided)
+    surfels = made.surfels
     with timed(seconds, "writing"):
         data = surfels_glb(surfels, str(node), pyramid.options.plain)
     return Tile(
@@ -177,7 +177,8 @@ def _placed(
         scale[of, None] * turned(surfels.position) + (stand.foot[which] - origin)[of],
         turned(surfels.normal),
         surfels.color[row] * stand.tint[which][of],
-        (scale * radius)[of],
+        (scale * radius)[of] * surfels.size[row],
+        surfels.size[row],
     )
     return discs, of
 

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from vegtool.arrays import FloatArray, IntArray, checked, unit
 from vegtool.gl.point_ids import seen_discs
 from vegtool.measure.views import upright
-from vegtool.surfel_set import Spacing, SurfelSet
+from vegtool.surfel_set import SurfelSet
 from vegtool.surfels.blue import distances
 from vegtool.surfels.blue.farthest import farthest_order
 from vegtool.surfels.blue.places import drawn
@@ -44,18 +44,20 @@ FAR = 0.95
 @dataclass(frozen=True, eq=False)
 class Discs:
     """n surfels that cover what they are of. position: (n, 3) metres. normal: (n, 3) unit. color:
-    (n, 3) linear. radius: (n,) metres."""
+    (n, 3) linear. radius: (n,) metres. size: (n,) as of SurfelSet, which radii are times already
+    and a group's surfels keep."""
 
     position: FloatArray
     normal: FloatArray
     color: FloatArray
     radius: FloatArray
+    size: FloatArray
 
     def __post_init__(self) -> None:
         position = checked("Discs.position", self.position, (None, 3), np.float64)
         object.__setattr__(self, "position", position)
         for name, shape in (("normal", (len(position), 3)), ("color", (len(position), 3)),
-                            ("radius", (len(position),))):  # fmt: skip
+                            ("radius", (len(position),)), ("size", (len(position),))):  # fmt: skip
             value = checked(f"Discs.{name}", getattr(self, name), shape, np.float64)
             object.__setattr__(self, name, value)
 
@@ -64,7 +66,10 @@ class Discs:
 
     def of(self, rows: npt.NDArray[np.bool_]) -> Discs:
         """Some of them."""
-        return Discs(self.position[rows], self.normal[rows], self.color[rows], self.radius[rows])
+        return Discs(
+            self.position[rows], self.normal[rows], self.color[rows], self.radius[rows],
+            self.size[rows],
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,36 +85,17 @@ class Group:
 def discs_of(surfels: SurfelSet) -> Discs:
     """All of a set, as large as they are drawn where there are no more."""
     _, radius = surfels.discs(np.zeros(1))
-    return Discs(surfels.position, surfels.normal, surfels.color, np.full(len(surfels), radius[0]))
+    return Discs(
+        surfels.position, surfels.normal, surfels.color, radius[0] * surfels.size, surfels.size
+    )
 
 
 def together(some: Sequence[Discs]) -> Discs:
     """All discs of several, one at least, in order."""
     return Discs(
         *(np.concatenate([getattr(one, name) for one in some])
-          for name in ("position", "normal", "color", "radius"))
+          for name in ("position", "normal", "color", "radius", "size"))
     )  # fmt: skip
-
-
-def covering(
-    parts: Sequence[SurfelSet], scales: Sequence[FloatArray], spacing: Spacing
-) -> FloatArray:
-    """(k,) SurfelSet.covering of a group: as parts of it are covered with discs of the same radius,
-    the larger ones counting for more. scales: (m,) of each part, at which it is there m times, or
-    nearly. spacing: of the group."""
-    if all((one.covering == 1.0).all() for one in parts):
-        return np.ones(1)
-    count = 1 + max(int(np.ceil(np.log2(max(spacing.total, 1)))), 0)
-    area, squared = np.zeros(count), np.zeros(count)
-    for step in range(count):
-        radius = spacing.radius(2**step)
-        for part, scale in zip(parts, scales, strict=True):
-            own = part.spacing
-            at_one = own.length * (own.radius_m * scale) ** 2 + SMALLEST_M**2
-            prefix = np.clip(at_one / max(radius, SMALLEST_M) ** 2, 1, len(part))
-            area[step] += at_one.sum()
-            squared[step] += (at_one * part.factors(prefix) ** 2).sum()
-    return np.asarray(np.sqrt(squared / area))
 
 
 def outside(discs: Discs) -> npt.NDArray[np.bool_]:
@@ -127,7 +113,9 @@ def outside(discs: Discs) -> npt.NDArray[np.bool_]:
     return seen_discs(discs.position, discs.normal, discs.radius, axes, resolution)
 
 
-def grouped(discs: Discs, count: int, *, seed: int = 0, unlit: bool = False) -> Group:
+def grouped(
+    discs: Discs, count: int, *, seed: int = 0, unlit: bool = False, double_sided: bool = True
+) -> Group:
     """At most `count` surfels of a group, of which there is a disc at least; no more than are seen.
 
     Raises UsageError for a negative count, CapabilityError where nothing can draw.
@@ -138,7 +126,9 @@ def grouped(discs: Discs, count: int, *, seed: int = 0, unlit: bool = False) -> 
     order = farthest_order(seen.position, count, seed=seed)
     color, normal = _means(seen, order)
     position = seen.position[order]
-    surfels = SurfelSet(position, normal, color, distances.spacing(position), unlit=unlit)
+    surfels = SurfelSet(
+        position, normal, color, distances.spacing(position), seen.size[order], unlit, double_sided
+    )
     error = 0.0
     if 0 < len(surfels) < len(seen):
         some = seen.position[:: max(len(seen) // PLACES, 1)]
