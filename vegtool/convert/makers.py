@@ -167,7 +167,7 @@ def level_maker(
         from vegtool.surfels.make import surfel_model
 
         model = surfel_model(
-            buffers.plant, options.surfels, options.display, options.max_texture, progress
+            buffers.plant, options.surfel_billboards, options.display, options.max_texture, progress
         )
         made_from = SurfelSource(source, model)
         return SurfelBillboards(partial(_cut, made_from, options), options, made_from)

@@ -49,8 +49,8 @@ OF_METHODS = {
 }
 """Methods beside refinement, and options of theirs alone."""
 
-OF_PICTURES = ("billboards", "pixels", "max_texture")
-"""Options that say nothing of surfels."""
+OF_PICTURES = ("billboards", "pixels", "max_texture", "prelit", "occlusion", "translucency")
+"""Options that say nothing of surfels, which have colours and normals alone."""
 FEWEST_POINTS, MOST_POINTS = 1_000, 200_000
 """Surfels of a level for which the user says no number."""
 
@@ -257,6 +257,7 @@ class ConvertOptions:
         return Display(self.fov, self.image_height)
 
     @property
-    def surfels(self) -> SurfelOptions:
+    def surfel_billboards(self) -> SurfelOptions:
         """What shapes a hierarchy of surfel billboards."""
-        return SurfelOptions(**{name: getattr(self, name) for name in OF_METHODS[SURFELS]})
+        own = OF_METHODS[SURFEL_BILLBOARDS]
+        return SurfelOptions(**{name: getattr(self, name) for name in own})
