@@ -19,6 +19,7 @@ from vegtool.formats.manifest import schema
 from vegtool.growth import sample
 from vegtool.lod import LodChain
 from vegtool.measure.options import MeasureOptions
+from vegtool.surfels.blue import candidates, level
 from vegtool.tiles.library import read_species
 
 pytestmark = pytest.mark.gl
@@ -85,10 +86,12 @@ def test_what_does_not_go_with_it_is_refused(options: dict[str, object], about: 
         ConvertOptions(**options)  # type: ignore[arg-type]
 
 
-def test_no_more_surfels_than_there_are_places() -> None:
+def test_no_more_surfels_than_there_are_places(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of 10^8 asked, as many as pixels have seen; each level has fewer than the one before."""
+    monkeypatch.setattr(level, "RESOLUTION", 256)
+    monkeypatch.setattr(candidates, "FINEST", 512)
     many = ConvertOptions(method="surfels", points=100_000_000, levels=2)
     plant = plant_of(np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]]))
     chain = convert(plant, many, BY_RULE)
-    counts = [len(level.surfels) for level in chain.levels[1:] if level.surfels is not None]
-    assert 10_000 < counts[0] < 8 * 1024**2 and counts[1] == counts[0] // 4
+    counts = [len(one.surfels) for one in chain.levels[1:] if one.surfels is not None]
+    assert 10_000 < counts[0] < 8 * 512**2 and counts[1] == counts[0] // 4

@@ -6,16 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from plants import plant_of
 from surfel_cases import both, surface
 
 from vegtool.gl.upload import PlantBuffers
 from vegtool.growth import sample
 from vegtool.plant import Material, Plant
 from vegtool.surfels.blue.candidates import (
+    PER_SURFEL,
     Candidates,
     Covered,
     candidates,
     corner_directions,
+    enough,
     joined,
     missed,
     seen_from,
@@ -113,3 +116,14 @@ def test_moved_and_scaled_plants_have_moved_and_scaled_candidates() -> None:
 @pytest.mark.parametrize("positions", [np.zeros((3, 3)), np.diag([0.0, 0, 1])])
 def test_what_has_no_surface_has_no_candidates(positions: np.ndarray) -> None:
     assert len(of(surface(positions, [[0, 1, 2]]))) == 0
+
+
+def test_what_is_little_of_its_picture_is_looked_at_more_closely() -> None:
+    """A needle: eight pictures of 128 pixels show few places of it, four times as many pixels along
+    each side sixteen times as many."""
+    needle = plant_of(np.array([[[0.0, 0, 0], [10, 0, 0], [0, 0.3, 0]]]))
+    with PlantBuffers(needle) as buffers:
+        few = candidates(buffers, 128)
+        assert enough(buffers, len(few) // PER_SURFEL, 128).pixel_m == few.pixel_m
+        many = enough(buffers, len(few), 128)
+    assert len(many) == pytest.approx(PER_SURFEL * len(few), rel=0.1)

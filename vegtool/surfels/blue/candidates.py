@@ -24,6 +24,10 @@ from vegtool.progress import Progress, silent
 
 RESOLUTION = 1024
 """Pixels along the longer side of a picture."""
+FINEST = 2048
+"""Pixels along it, where what is seen is little of the picture."""
+PER_SURFEL = 12
+"""Candidates that are enough: of fewer, surfels lie where pixels do, and leave holes."""
 FLATTEST = 0.2
 """Of the longest side of the bounds: none counts as less, so that nothing is seen edge-on alone."""
 CELL = 2.0
@@ -106,6 +110,19 @@ def candidates(
         if idle == AGAIN:
             break
     return joined(found)
+
+
+def enough(
+    buffers: PlantBuffers, count: int, resolution: int = RESOLUTION, progress: Progress = silent
+) -> Candidates:
+    """The same for `count` surfels: of finer pictures than of `resolution`, up to FINEST, where
+    these have too few, as of what is thin or long."""
+    found = candidates(buffers, resolution, progress)
+    wanted = PER_SURFEL * count
+    if not 0 < len(found) < wanted:
+        return found
+    finer = min(int(resolution * (wanted / len(found)) ** 0.5), FINEST)
+    return found if finer <= resolution else candidates(buffers, finer, progress)
 
 
 def missed(buffers: PlantBuffers, those: Candidates, resolution: int = RESOLUTION) -> float:

@@ -17,7 +17,7 @@ from vegtool.gl.upload import PlantBuffers
 from vegtool.lod import Display, Level
 from vegtool.progress import Progress, silent
 from vegtool.surfel_set import SurfelSet
-from vegtool.surfels.blue.candidates import RESOLUTION, candidates
+from vegtool.surfels.blue.candidates import RESOLUTION, enough
 from vegtool.surfels.blue.make import ORDERED, SEEN, ordered, sized
 from vegtool.timing import timed
 
@@ -53,8 +53,8 @@ def sampled(
     seconds: dict[str, float] = {}
     materials = buffers.plant.materials
     with timed(seconds, "candidates"):
-        found = candidates(
-            buffers, resolution_for(count), lambda stage, f: progress(stage, SEEN * f)
+        found = enough(
+            buffers, count, resolution_for(count), lambda stage, f: progress(stage, SEEN * f)
         )
     with timed(seconds, "order"):
         surfels = ordered(

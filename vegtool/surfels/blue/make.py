@@ -17,7 +17,7 @@ from vegtool.measure.views import Camera
 from vegtool.progress import Progress, silent
 from vegtool.surfel_set import SurfelSet
 from vegtool.surfels.blue.averaged import averaged
-from vegtool.surfels.blue.candidates import RESOLUTION, Candidates, candidates
+from vegtool.surfels.blue.candidates import RESOLUTION, Candidates, enough
 from vegtool.surfels.blue.covering import sizes
 from vegtool.surfels.blue.distances import spacing
 from vegtool.surfels.blue.farthest import farthest_order
@@ -43,9 +43,10 @@ def surfels_of(
     """At most `count` surfels of a plant; fewer where no more places of it are seen from outside.
 
     buffers: without mipmaps. resolution: pixels along the diagonal of the plant's bounds at which
-    it is looked at. Raises UsageError for a negative count, CapabilityError where nothing can draw.
+    it is looked at, at least. Raises UsageError for a negative count, CapabilityError where nothing
+    can draw.
     """
-    found = candidates(buffers, resolution, lambda stage, f: progress(stage, SEEN * f))
+    found = enough(buffers, count, resolution, lambda stage, f: progress(stage, SEEN * f))
     progress("order", SEEN)
     materials = buffers.plant.materials
     surfels = ordered(
