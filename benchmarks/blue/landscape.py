@@ -15,7 +15,7 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from walk.scenes import Say, key_of
+from walk.scenes import Say, first_levels, key_of
 from walk.truth import Whole
 
 from blue.similarity import hierarchical
@@ -163,15 +163,7 @@ def _with_surfels(one: Species, other: Species) -> Species:
     """Billboards as far as the surfels' distance, and those from there on."""
     assert other.surfels is not None
     count = int((one.switch_m < other.surfels.switch_m).sum())
-    return replace(
-        one,
-        levels=one.levels[:count],
-        switch_m=np.array(one.switch_m[:count]),
-        fade=np.array(one.fade[:count]),
-        files=one.files[:count],
-        error_m=one.error_m[:count],
-        surfels=other.surfels,
-    )
+    return replace(first_levels(one, count), surfels=other.surfels)
 
 
 @contextmanager

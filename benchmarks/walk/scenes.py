@@ -170,7 +170,7 @@ def world_of(setting: Setting, cache: Path, say: Say) -> World:
 
 def with_originals(world: World) -> World:
     """The same without levels."""
-    return replace(world, species=tuple(_of(one, 1) for one in world.species))
+    return replace(world, species=tuple(first_levels(one, 1) for one in world.species))
 
 
 def with_crossed(world: World) -> World:
@@ -178,11 +178,12 @@ def with_crossed(world: World) -> World:
     species = []
     for one in world.species:
         level = client_plant(crossed(one.levels[0]))
-        species.append(replace(_of(one, 1), levels=(level,)))
+        species.append(replace(first_levels(one, 1), levels=(level,)))
     return replace(world, species=tuple(species))
 
 
-def _of(species: Species, levels: int) -> Species:
+def first_levels(species: Species, levels: int) -> Species:
+    """A species of its first levels alone."""
     return replace(
         species,
         levels=species.levels[:levels],

@@ -48,7 +48,8 @@ class TileWorld:
         return _height(self.tileset, np.array([x, z]))
 
     def scenery(self, fade: FadeMode) -> TileForest:
-        """What draws it; nothing is uploaded yet. Tiles follow each other at once."""
+        """What draws it; nothing is uploaded yet. Tiles follow each other at once,
+        but those of surfels, which blend."""
         return TileForest(self.tileset, self.ground)
 
     def details(self, focal_px: float) -> list[str]:
