@@ -45,8 +45,11 @@ MAY_IMPORT: dict[str, set[str]] = {
     "workers": set(),
     "batch": {"convert", "formats", "measure", "workers"},
     "scene": {"convert", "lighting"},
+    "camera_path": {"scene"},
+    "needs": {"camera_path", "formats", "lighting", "scene", "tiles"},
     "preview": {
-        "elements", "formats", "gl", "lighting", "measure", "scene", "surfels", "tiles",
+        "camera_path", "elements", "formats", "gl", "lighting", "measure", "scene", "surfels",
+        "tiles",
     },
     "stability": {
         "branches", "clustering", "boxes", "gl", "lighting", "baking", "measure", "refine",

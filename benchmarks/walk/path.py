@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from vegtool.arrays import FloatArray
+from vegtool.camera_path.file import CameraPath, Station, read_path, written
 from vegtool.preview.eye import Eye
-from vegtool.preview.path import CameraPath, Station, duration_s, eyes, read_path, written
+from vegtool.preview.path import duration_s, eyes
 from vegtool.preview.world import World
 from walk.scenes import TREES, Setting
 from walk.trail import middle

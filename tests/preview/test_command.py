@@ -20,11 +20,11 @@ import pytest
 import xvfb
 from PIL import Image
 
+from vegtool.camera_path.file import read_path
 from vegtool.cli import run
 from vegtool.formats.gltf import plant_glb
 from vegtool.growth import sample
 from vegtool.preview import command, drawn
-from vegtool.preview.path import read_path
 from vegtool.preview.show import Show
 from vegtool.preview.state import help_text
 

@@ -12,21 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vegtool.arrays import FloatArray
+from vegtool.camera_path.curve import through
+from vegtool.camera_path.file import KEYS, STATION, CameraPath, Station, read_path, written
 from vegtool.errors import UsageError
-from vegtool.preview.curve import through
 from vegtool.preview.eye import Eye
-from vegtool.preview.path import (
-    KEYS,
-    MOST_FRAMES,
-    STATION,
-    CameraPath,
-    Station,
-    duration_s,
-    eyes,
-    read_path,
-    recorded,
-    written,
-)
+from vegtool.preview.path import MOST_FRAMES, duration_s, eyes, recorded
 from vegtool.scene import KINDS
 
 PAGE = Path(__file__).parent.parent.parent / "docs" / "camera_path.md"

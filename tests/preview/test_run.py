@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vegtool.camera_path.file import read_path
 from vegtool.gl.screen import Screen
 from vegtool.growth import sample
 from vegtool.lighting.light import Light
@@ -15,7 +16,6 @@ from vegtool.preview.command import part
 from vegtool.preview.drawn import BEHIND_M, Keeper, _backdrop, show_of
 from vegtool.preview.eye import Eye
 from vegtool.preview.options import PreviewOptions
-from vegtool.preview.path import read_path
 from vegtool.preview.run import frames, loaded, settle, summary, timed_frames
 from vegtool.preview.show import Show
 from vegtool.preview.world import World, _row

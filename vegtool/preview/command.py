@@ -18,7 +18,7 @@ from vegtool.progress import Progress
 from vegtool.surfels.options import SUFFIX
 
 if TYPE_CHECKING:
-    from vegtool.preview.path import CameraPath
+    from vegtool.camera_path.file import CameraPath
     from vegtool.preview.scenery import Place
     from vegtool.scene import Scene
 
@@ -96,7 +96,7 @@ def run_preview(
         way = way or way_of(scene)
     path = None
     if way is not None:
-        from vegtool.preview.path import read_path
+        from vegtool.camera_path.file import read_path
 
         path = read_path(way)
     _check_written(wanted, path, _inputs(wanted, scene, way))

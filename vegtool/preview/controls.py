@@ -6,17 +6,14 @@ depend on how the time is cut into frames.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from math import ceil, inf
 
 import numpy as np
 
 from vegtool.arrays import FloatArray, checked
+from vegtool.camera_path.course import Ground
 from vegtool.preview.eye import Eye
-
-Ground = Callable[[float, float], float]
-"""The height of the ground in metres at x, z in metres."""
 
 SPEED_M_S = 3.0
 """Of flight, until the wheel is turned: a fast walk."""

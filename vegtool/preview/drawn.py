@@ -11,6 +11,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from vegtool.camera_path.file import CameraPath, written
 from vegtool.errors import VegtoolError
 from vegtool.formats.atomic import FileSet
 from vegtool.formats.png import encode
@@ -23,7 +24,7 @@ from vegtool.preview.controls import Fly, Orbit, orbiting
 from vegtool.preview.eye import Eye
 from vegtool.preview.governor import BEGIN, Governor
 from vegtool.preview.options import FadeMode, PreviewOptions
-from vegtool.preview.path import CameraPath, duration_s, eyes, recorded, written
+from vegtool.preview.path import duration_s, eyes, recorded
 from vegtool.preview.run import frames, loaded, settle, summary, timed_frames
 from vegtool.preview.scenery import Place
 from vegtool.preview.show import SKY, Show
