@@ -80,17 +80,16 @@ def cells_of_area(corners: FloatArray, margin: float, floor: Floor, height: Rang
     parts = []
     for level in range(LEVELS + 1):
         size = (high - low) / 2**level
-        sides = low + np.arange(2**level + 1)[:, None] * size
-        x, z = (np.stack([side[:-1], side[1:]], axis=1) for side in sides.T)
-        least, greatest = (each[cell[:, 1], cell[:, 0]] for each in floor.on_grid(x, z))
         first = low + cell * size
         meets = within(first, corners) | (gaps(first, first + size, corners, ends) <= margin).any(1)
-        done = meets & ((greatest - least <= allowed) | (level == LEVELS))
+        cell, first = cell[meets], first[meets]
+        least, greatest = floor.within(first, first + size)
+        done = (greatest - least <= allowed) | (level == LEVELS)
         middle = first[done] + size / 2
         radius = np.full(len(middle), np.hypot(*size) / 2)
         parts.append((middle, radius, least[done] + height[0], greatest[done] + height[1]))
         quarters = [[0, 0], [1, 0], [0, 1], [1, 1]]
-        cell = (2 * cell[meets & ~done][:, None] + quarters).reshape(-1, 2)
+        cell = (2 * cell[~done][:, None] + quarters).reshape(-1, 2)
     middle, radius, bottom, top = (np.concatenate(part) for part in zip(*parts, strict=True))
     return Cells(middle, middle, radius, bottom, top)
 
@@ -121,7 +120,8 @@ def pieces_of(course: Course, margin: float, floor: Floor, height: Range | None)
         ends = np.repeat(course.curve.points, 2, axis=0)
         share = np.full((1, 2), float(course.path.stations[0].above_ground))
         level = np.repeat(course.ground, 2, axis=0).T
-        base = ends[None, :, 1] - share * level
+        usual = level[:, :1]
+        base = ends[None, :, 1] - share * (level - usual)
         bend, sway = np.zeros(1), np.zeros(1)
         station = np.zeros(1, np.int64)
     else:
@@ -134,7 +134,8 @@ def pieces_of(course: Course, margin: float, floor: Floor, height: Range | None)
         at = course.at(leg, parameter, fraction.ravel(), floor.height_at).reshape(legs, count, 3)
         share = course.share(leg, fraction.ravel()).reshape(legs, count)
         level = floor.terrain.height(at[..., [0, 2]].reshape(-1, 2)).reshape(legs, count)
-        base = at[..., 1] - share * level
+        usual = level.mean(axis=1, keepdims=True)  # heights are small from there on
+        base = at[..., 1] - share * (level - usual)
         # a cubic is off its chord by at most an eighth of its second difference, which is linear
         bend = _second(at[..., [0, 2]]).ravel() / 8
         sway = _second(base[..., None]).ravel() / 4  # it is no cubic where the share changes
@@ -153,6 +154,8 @@ def pieces_of(course: Course, margin: float, floor: Floor, height: Range | None)
             (np.minimum(least, base_m), np.maximum(greatest, base_m))
             for least, greatest in (under, around)
         )
+    usual = np.repeat(usual[:, 0], base.shape[1] - 1)
+    under, around = ((least - usual, greatest - usual) for least, greatest in (under, around))
     most = _products(shares, around)
     low, high = lowest + most.min(axis=0), highest + most.max(axis=0)
     if margin:  # what keeps above the ground though the path does not
@@ -160,8 +163,8 @@ def pieces_of(course: Course, margin: float, floor: Floor, height: Range | None)
         low = np.minimum(low, lowest + around[0] - rest.max(axis=0))
         high = np.maximum(high, highest + around[1] - rest.min(axis=0))
     if height is not None:
-        low = np.minimum(low, around[0] + height[0])
-        high = np.maximum(high, around[1] + height[1])
+        low = np.minimum(low, usual + around[0] + height[0])
+        high = np.maximum(high, usual + around[1] + height[1])
     ground = floor.terrain.height(node) if floor.feet is None else floor.feet[1]
     above = ends[:, 1] - ground
     return Pieces(

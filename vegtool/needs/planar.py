@@ -54,7 +54,7 @@ def _from_points(points: FloatArray, start: FloatArray, end: FloatArray) -> Floa
     dx, dz = (end - start).T
     square = np.maximum(dx * dx + dz * dz, PARALLEL)
     share = np.clip((x * dx + z * dz) / square, 0.0, 1.0)
-    return np.hypot(x - share * dx, z - share * dz)
+    return np.asarray(np.hypot(x - share * dx, z - share * dz))
 
 
 def _from_rectangles(low: FloatArray, high: FloatArray, point: FloatArray) -> FloatArray:
