@@ -37,6 +37,8 @@ CASES = {
     "a place": ("", SPOT),
     "about a place": ("margin_m = 2", SPOT),
 }
+FLIGHTS = ("a flight", "a flight with a margin")
+"""Over the hills, at heights of their own."""
 STEEPEST = 0.8
 """Metres that hills() rise by a metre at most."""
 GROUNDS = {"flat": FLAT, "hills": hills()}
@@ -61,12 +63,11 @@ def angles(points: FloatArray, eyes: FloatArray) -> tuple[FloatArray, FloatArray
     return np.hypot(flat, y), np.arctan2(x, z), np.arctan2(y, flat)
 
 
-@pytest.mark.parametrize("ground", GROUNDS)
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    ("case", "ground"), [(a, b) for a in CASES for b in GROUNDS if b == "hills" or a not in FLIGHTS]
+)
 def test_no_eye_is_nearer_farther_or_elsewhere(tmp_path: Path, case: str, ground: str) -> None:
     floor = GROUNDS[ground]
-    if ground == "flat" and "flight" in case:
-        pytest.skip("its heights are those of the hills")
     there = viewers(tmp_path, *CASES[case], floor)
     points, radius = around(floor), generator(2, "radius").uniform(0, 4, 80)
     eyes = inside(there, 3000, 0).position
@@ -84,20 +85,20 @@ def test_no_eye_is_nearer_farther_or_elsewhere(tmp_path: Path, case: str, ground
 
 @pytest.mark.parametrize("case", CASES)
 def test_bounds_are_tight(tmp_path: Path, case: str) -> None:
-    """On steep hills, to 5 % and half a metre of what 20,000 eyes come to, as they leave out as
-    much, and what the ground rises within the smallest squares, or the margin of a path."""
+    """On steep hills, to 5 % and 0.75 m of what 10,000 eyes come to, which leave out a part of it
+    too, and what the ground rises within the smallest squares, or the margin of a path."""
     floor = hills()
     there = viewers(tmp_path, *CASES[case], floor)
     points = around(floor)
-    _check_tight(there, points, inside(there, 20_000, 0).position, case == "at any height")
+    _check_tight(there, points, inside(there, 10_000, 0).position, case == "at any height")
 
 
 def _check_tight(there: Viewers, points: FloatArray, eyes: FloatArray, any_height: bool) -> None:
     away, _, elevation = angles(points, eyes)
     near, far = away.min(axis=1), away.max(axis=1)
-    slack = 0.5 + 2 * STEEPEST * float(there.cells.radius.max())
+    slack = 0.75 + 2 * STEEPEST * float(there.cells.radius.max())
     assert (there.nearest(points) >= 0.95 * near - slack).all()
-    seen, wide = there.directions(points), np.arcsin(np.minimum(slack / near, 1))
+    seen, wide = there.directions(points), np.arcsin(np.minimum(0.05 + slack / near, 1))
     outside = near > 4
     assert (seen.low >= elevation.min(axis=1) - wide)[outside].all()
     if not any_height:
