@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from vegtool.errors import UsageError
-from vegtool.needs.budget import Choices, choices, evenly, spread
+from vegtool.plan.budget import Choices, choices, evenly, spread
 from vegtool.seeding import generator
 
 AT = np.array([5.0, 20.0, 80.0])

@@ -1,0 +1,1 @@
+"""What a scene's viewers need of its plants, what is left out, and how a budget is spent on it."""
