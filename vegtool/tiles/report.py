@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from vegtool.console import human_bytes, table
+from vegtool.tiles.estimate import TOO_FAR, TOO_NEAR
 from vegtool.tiles.jobs import Failed, Made, World
 from vegtool.tiles.quadtree import Node
 
@@ -72,7 +73,29 @@ def text_of(facts: Mapping[str, Any]) -> str:
         f"{where}: {facts['plants']:,} plants, {made:,} tiles{kept}, "
         f"{human_bytes(facts['bytes'])}, {facts['seconds']:,.1f} s"
     )
-    return f"{title}\n\n{table(head, rows)}" if rows else title
+    parts = [title, table(head, rows)] if rows else [title]
+    if facts.get("scene", {}).get("left_out"):
+        parts.append(left_out(facts["scene"]))
+    return "\n\n".join(parts)
+
+
+def left_out(scene: Mapping[str, Any]) -> str:
+    """What of a landscape no viewer of a scene is shown."""
+    head = ["left out of", "squares", TOO_NEAR, TOO_FAR, "with plants", "bytes, about"]
+    rows = [
+        [
+            f"{row['side_m']:,.4g} m",
+            f"{row['squares'] - row['kept']:,} of {row['squares']:,}",
+            f"{row['too_near']:,}",
+            f"{row['too_far']:,}",
+            f"{row['plants']:,}",
+            human_bytes(row["bytes"]),
+        ]
+        for row in scene["left_out"]
+    ]
+    models = scene["models"]
+    count = models["all"] - models["kept"]
+    return f"{table(head, rows)}\n\n{count:,} of {models['all']:,} models are left out as well"
 
 
 def _node(one: Made) -> Node:
