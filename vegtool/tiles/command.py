@@ -116,9 +116,7 @@ def _made(
         ]
         files = [] if only else work.finish()
     seconds = perf_counter() - started
-    facts = facts_of(world, work.shown(made), work.failed, out, files, seconds)
-    if work.told() is not None:
-        facts["scene"] = work.told()
+    facts = facts_of(world, work.shown(made), work.failed, out, files, seconds, work.told())
     failed = tuple(work.failed.values())
     if failed and not any(one.entry.facts.get("plants") for one in made):
         return Result(facts, "", failed, failed[0].exit_code)

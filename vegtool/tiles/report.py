@@ -14,9 +14,10 @@ from vegtool.tiles.quadtree import Node
 
 def facts_of(
     world: World, made: Sequence[Made], failed: Mapping[str, Failed], out: Path,
-    files: Sequence[str], seconds: float,
+    files: Sequence[str], seconds: float, scene: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """What `--json` prints. files: with which clients begin, if they were written."""
+    """What `--json` prints. files: with which clients begin, if they were written. scene: what of a
+    scene the tileset is for, if of any."""
     tiles = [one for one in made if one.entry.facts.get("plants")]
     rows = [
         {
@@ -36,9 +37,10 @@ def facts_of(
     heights = sorted({row["height"] for row in rows})
     size = sum(sum(one.entry.files.values()) for one in made)
     size += sum((out / file).stat().st_size for file in files)
-    return {
+    plants = max((row["plants"] for row in rows), default=0)
+    facts = {
         "tileset": str(out / files[0]) if files else None,
-        "plants": max((row["plants"] for row in rows), default=0),
+        "plants": plants if scene is None else scene["plants"],
         "made": sum(one.again for one in tiles),
         "bytes": size,
         "shared_bytes": sum(sum(one.entry.files.values()) for one in made if not one.entry.facts),
@@ -48,6 +50,7 @@ def facts_of(
         "failed": {name: one.message for name, one in failed.items()},
         "notes": list(world.pyramid.notes),
     }
+    return facts if scene is None else {**facts, "scene": dict(scene)}
 
 
 def text_of(facts: Mapping[str, Any]) -> str:

@@ -23,6 +23,8 @@ from vegtool.plant import Plant, Texture
 WIDELY_SPREAD = 0.01
 """Of the area that shows a texture, the part on which texels may be larger than they are taken to
 be: slivers, whose texels are as large as one likes."""
+LEAST_PIXELS = 1e-6
+"""To a metre: less is seen of nothing."""
 FEWEST = 4
 """Texels on a side, below which no texture is made smaller."""
 
@@ -65,8 +67,11 @@ def resolved(plant: Plant, per_metre: float) -> Plant:
             return None
         high, wide = texture.pixels.shape[:2]
         density = texels_per_metre(plant, faces, wide, high)
-        halvings = int(min(log2(density / per_metre), log2(min(wide, high) / FEWEST), 16.0))
-        if density <= per_metre or halvings < 1:
+        if density <= per_metre or min(wide, high) <= FEWEST:
+            return texture
+        fine, least = density / max(per_metre, LEAST_PIXELS), min(wide, high) / FEWEST
+        halvings = int(log2(min(fine, least)))
+        if not halvings:
             return texture
         mips = mip_levels(texture.pixels, srgb)
         return Texture(texture.name, [next(mips) for _ in range(halvings)][-1])

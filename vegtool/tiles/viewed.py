@@ -66,6 +66,7 @@ class ViewedRun(Run):
         self.passed = passed_over(world.pyramid, view)
         self.surveyed: dict[str, Surveyed] = {}
         self.kept: set[str] = set()
+        self._plants = 0
         self._lacking: list[Lacking] = []
         self._shared: set[str] = set()
 
@@ -86,7 +87,8 @@ class ViewedRun(Run):
                     yield from self._far_squares(nodes, write)
                 yield from self._do(self._sheets(nodes), write)
             root = self._root()
-            self.kept = set() if root is None else contents_of(root)
+            if root is not None:
+                self.kept, self._plants = contents_of(root), root.plants
             shown = [node for node in self._all_nodes() if file_of(node) in self.kept]
             near = [node for node in shown if str(node) in self.surveyed]
             yield from self._do(self._models(near), write)
@@ -103,7 +105,12 @@ class ViewedRun(Run):
         every = len(models(self.world.pyramid))
         kept = sum(name.startswith("model") for name in self._shared)
         models_of = {"all": every, "kept": kept}
-        return {**self.view.told, "left_out": self.left_out(), "models": models_of}
+        return {
+            **self.view.told,
+            "plants": self._plants,
+            "left_out": self.left_out(),
+            "models": models_of,
+        }
 
     def shown(self, made: Sequence[Made]) -> list[Made]:
         """Of what was made, what the tileset has: each once, with the seconds of all times."""
