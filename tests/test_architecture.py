@@ -67,7 +67,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "__main__": {"cli"},
     "cli": {
         "batch", "console", "convert", "doctor", "flags", "formats", "growth", "inspect",
-        "measure", "outcomes", "preview", "report", "scene", "stability", "tiles",
+        "measure", "needs", "outcomes", "preview", "report", "scene", "stability", "tiles",
     },
 }  # fmt: skip
 

@@ -10,6 +10,7 @@ import logging
 import re
 import signal
 import sys
+from functools import partial
 from io import TextIOWrapper
 from pathlib import Path
 from typing import Annotated, Any
@@ -421,6 +422,15 @@ def tiles_command(
     ] = None,
     out: Out,
     tiles: TileOptions,
+    scene: Annotated[
+        Path | None,
+        typer.Option(
+            "--scene",
+            help="Make what the viewers of this scene can be shown, and nothing else.",
+            metavar="FILE.toml",
+            parser=_path,
+        ),
+    ] = None,
     jobs: Annotated[
         int | None,
         typer.Option(
@@ -463,6 +473,8 @@ def tiles_command(
 
         vegtool tiles scene.toml --species library/ -o tiles/ --dry-run
 
+        vegtool tiles scene.toml --species library/ --scene scene.toml -o tiles/
+
         vegtool tiles oak.surfels -o oak/
 
         vegtool preview tiles/
@@ -471,7 +483,12 @@ def tiles_command(
 
     console = Console(-1 if quiet else verbose, json)
     how = RunOptions(jobs, dask, tuple(only or ()), dry_run, force)
-    result = run_tiles(source, species, out, tiles, how, console.bar, console.say)
+    view = None
+    if scene is not None:
+        from vegtool.needs.view import view_of
+
+        view = partial(view_of, scene)
+    result = run_tiles(source, species, out, tiles, how, console.bar, console.say, view)
     for one in result.failed:
         console.say(f"error: {one.message}", at=-1)
         console.say(one.trace, at=2)

@@ -14,14 +14,14 @@ from surfel_sets import ball
 from vegtool.errors import InputError
 from vegtool.formats.gltf import plant_glb
 from vegtool.formats.gltf_tile import surfels_glb
-from vegtool.formats.tileset import CLIENT_PX, TILESET, TileEntry, tileset_files
+from vegtool.formats.tileset import BLENDED, CLIENT_PX, TILESET, TileEntry, tileset_files
 from vegtool.gl.context import framebuffer_kept
 from vegtool.preview import tile_store
 from vegtool.preview.eye import Eye, towards
 from vegtool.preview.fovea import Fovea
 from vegtool.preview.palette import COLORS
 from vegtool.preview.scenery import Look
-from vegtool.preview.tile_forest import BLENDED, TileForest
+from vegtool.preview.tile_forest import TileForest
 from vegtool.preview.tile_world import TileWorld, read_tile_world
 
 pytestmark = pytest.mark.gl

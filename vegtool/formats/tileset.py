@@ -8,7 +8,7 @@ precision; numbers in files stay small.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import PurePosixPath
 from typing import Any
@@ -26,6 +26,10 @@ TILESET = "tileset.json"
 CLIENT_PX = 16.0
 """Pixels that a tile's error may be seen as before clients go on to its children, unless they are
 told otherwise."""
+BLENDED = 0.2
+"""Of the distance at which a tile of surfels gives way to its quarters: along so much of it before,
+both are drawn. In the nearer half of it, all surfels of the quarters are, in the other all of the
+tile's own, so that there are no holes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,13 +54,15 @@ def tileset_files(
     placed: FloatArray | None,
     seen_px: float = CLIENT_PX,
     gone_m: float | None = None,
+    scene: Mapping[str, Any] | None = None,
 ) -> dict[str, bytes]:
     """TILESET and, where there are many tiles, others that it refers to, beside the tiles.
 
     placed: (4, 4) from the scene's frame, z up, to the earth's; None where it has no place there.
     Where the root is in the scene's frame, y up, is among its extras: origin_m. seen_px: pixels
     that errors are to be seen as; what clients have not unless told so is among them, too. gone_m:
-    metres, the error of showing nothing; twice the root's if None.
+    metres, the error of showing nothing; twice the root's if None. scene: plain values, what of a
+    scene it is made for, which are among them where there are any.
     """
     base = np.eye(4) if placed is None else placed
     files: dict[str, bytes] = {}
@@ -65,6 +71,8 @@ def tileset_files(
     top["extras"]["origin_m"] = root.origin.tolist()
     if seen_px != CLIENT_PX:
         top["extras"]["seen_px"] = seen_px
+    if scene is not None:
+        top["extras"]["scene"] = dict(scene)
     top["transform"] = _columns(base @ _translation(root.origin))
     files[TILESET] = _file(top, 2 * root.error_m if gone_m is None else gone_m)
     return files

@@ -20,12 +20,12 @@ def refined(
     error_m: FloatArray,
     viewers: Viewers,
     display: Display,
-    seen_px: float = CLIENT_PX,
+    seen_px: FloatArray | float = CLIENT_PX,
 ) -> BoolArray:
     """(n,) whether clients may ever show the quarters of squares in place of them.
 
     boxes: (n, 2, 3) metres in the scene's frame, least and greatest corners. error_m: (n,) metres,
-    geometric error. seen_px: pixels that clients take errors of as not seen.
+    geometric error. seen_px: pixels, of all or (n,), that clients take errors of as not seen.
     """
     near = viewers.nearest_to_boxes(np.asarray(boxes, np.float64))
     return np.asarray(error_m * display.pixels_per_metre(1.0) > seen_px * near)

@@ -18,6 +18,7 @@ from time import perf_counter
 import numpy as np
 
 from vegtool.arrays import FloatArray, Picture
+from vegtool.formats.tileset import BLENDED
 from vegtool.gl.context import OnGpu
 from vegtool.gl.draw import MSAA
 from vegtool.gl.instances import INSTANCE, WHOLE
@@ -33,10 +34,6 @@ from vegtool.preview.tileset import LongArray, Tileset
 
 NEAREST_M = 0.1
 """An eye in a tile's box is no nearer."""
-BLENDED = 0.2
-"""Of the distance at which a tile of surfels gives way to its quarters: along so much of it before,
-both are drawn. In the nearer half of it, all surfels of the quarters are, in the other all of the
-tile's own, so that there are no holes."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,10 +18,15 @@ from vegtool.tiles.options import RunOptions, TileOptions
 
 if TYPE_CHECKING:
     from vegtool.tiles.jobs import Failed, Inputs, World
-    from vegtool.tiles.run import Each
+    from vegtool.tiles.placement import Placement
+    from vegtool.tiles.run import Each, Run
+    from vegtool.tiles.view import View
 
 Bar = Callable[[str], AbstractContextManager[Progress]]
 """What shows progress, under a title, as long as it is open."""
+
+ViewOf = Callable[["Placement"], "View"]
+"""Whom tiles of plants that are placed are for."""
 
 
 @dataclass(frozen=True)
@@ -37,15 +42,17 @@ class Result:
 
 def run_tiles(
     scene: Path, library: Path | None, out: Path, options: TileOptions, run: RunOptions, bar: Bar,
-    say: Callable[[str], None],
+    say: Callable[[str], None], view_of: ViewOf | None = None,
 ) -> Result:  # fmt: skip
     """Make the tiles of a scene or an inventory, or of one plant's surfel billboards; or, in a dry
-    run, say what they would be.
+    run, say what they would be. view_of: whom they are for; anybody if None.
 
     Raises UsageError and InputError for what is missing or broken, OutputError where nothing can be
     written, CapabilityError where nothing can draw.
     """
     if scene.suffix.lower() == SUFFIX:
+        if view_of is not None:
+            raise UsageError(f"--scene: expected a landscape; got one plant, {scene}; leave it out")
         from vegtool.tiles.surfel_tiles import run_surfel_tiles
 
         return run_surfel_tiles(scene, library, out, options, run, bar)
@@ -59,41 +66,57 @@ def run_tiles(
     started = perf_counter()
     if run.dask is not None and run.jobs is not None:
         raise UsageError("--dask: is in place of processes here; leave out -j")
+    if run.only and view_of is not None:
+        raise UsageError(
+            "--only: what a scene needs of one tile depends on others; leave out --scene"
+        )
     inputs = Inputs(scene.absolute(), library.absolute(), out.absolute(), options)
     _check_out(inputs, run.force)
     with bar("reading") as progress:
         world = world_of(inputs, progress, run.jobs or os.cpu_count() or 1)
     inputs = replace(inputs, digest=world.digest)
-    for note in world.pyramid.notes:
+    view = None if view_of is None else view_of(world.pyramid.placement)
+    for note in (*world.pyramid.notes, *(() if view is None else view.notes)):
         say(note)
     with bar("tiles") as progress:
         if run.dry_run:
             from vegtool.tiles.estimate import estimated
 
-            facts, text = estimated(world, _processes(world, run), progress)
+            facts, text = estimated(world, _processes(world, run), progress, view)
             return Result(facts, text)
         with _crew(inputs, world, run) as each:
-            return _made(world, each, run, progress, out, started)
+            start = partial(_run, world, view, each, progress)
+            return _made(world, start, run, out, started)
+
+
+def _run(world: World, view: View | None, each: Each, progress: Progress) -> Run:
+    from vegtool.tiles.run import Run
+    from vegtool.tiles.viewed import ViewedRun
+
+    if view is None:
+        return Run(world, each, progress)
+    return ViewedRun(world, view, each, progress)
 
 
 def _made(
-    world: World, each: Each, run: RunOptions, progress: Progress, out: Path, started: float
+    world: World, start: Callable[[], Run], run: RunOptions, out: Path, started: float
 ) -> Result:
     from vegtool.tiles.jobs import Made
     from vegtool.tiles.journal import locked
     from vegtool.tiles.report import facts_of, text_of
-    from vegtool.tiles.run import Run, node_of
+    from vegtool.tiles.run import node_of
 
     only = [node_of(name, world.pyramid) for name in run.only]
     with locked(out):
-        work = Run(world, each, progress)
+        work = start()
         made = [
             outcome
             for outcome in (work.only(only) if only else work.tiles())
             if isinstance(outcome, Made)
         ]
         files = [] if only else work.finish()
-    facts = facts_of(world, made, work.failed, out, files, perf_counter() - started)
+    seconds = perf_counter() - started
+    facts = facts_of(world, work.shown(made), work.failed, out, files, seconds, work.told())
     failed = tuple(work.failed.values())
     if failed and not any(one.entry.facts.get("plants") for one in made):
         return Result(facts, "", failed, failed[0].exit_code)

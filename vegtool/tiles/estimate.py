@@ -6,6 +6,7 @@ others. Far squares are not made: they cost what those of others did.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -16,9 +17,12 @@ from vegtool.console import human_bytes, table
 from vegtool.errors import VegtoolError
 from vegtool.progress import Progress
 from vegtool.tiles.jobs import TILES, Failed, Made, SheetJob, World, do
-from vegtool.tiles.pyramid import MOST
+from vegtool.tiles.needed import passed_over, reached_by
+from vegtool.tiles.pyramid import MOST, Pyramid
+from vegtool.tiles.quadtree import Node
 from vegtool.tiles.run import blocks, models
 from vegtool.tiles.shared import Shared
+from vegtool.tiles.view import View
 
 FAR_S = 5.0
 """Seconds of one core for a square of 65,536 triangles that is clustered anew."""
@@ -28,16 +32,49 @@ FAR_BYTES = 60.0
 SURFELS_S = 7.0
 """Seconds of one core for a square of MOST surfels, made of its quarters'."""
 SURFEL_BYTES = 20.0
+TOO_NEAR, TOO_FAR = "eyes too near", "eyes too far"
+"""What is said of squares that no viewer is shown."""
 
 
-def estimated(world: World, processes: int, progress: Progress) -> tuple[dict[str, Any], str]:
-    """Facts for machines, text for people. Nothing is left behind."""
+def estimated(
+    world: World, processes: int, progress: Progress, view: View | None = None
+) -> tuple[dict[str, Any], str]:
+    """Facts for machines, text for people. view: whom it is for. Nothing is left behind."""
     with TemporaryDirectory() as folder:
         trial = World(world.pyramid, Shared(world.pyramid, Path(folder) / TILES), Path(folder))
-        return _estimated(trial, processes, progress)
+        return _estimated(trial, processes, progress, view)
 
 
-def _estimated(world: World, processes: int, progress: Progress) -> tuple[dict[str, Any], str]:
+@dataclass(frozen=True)
+class _Squares:
+    """Of a height: those that are written, those that are made, and why others are not."""
+
+    kept: list[Node]
+    made: list[Node]
+    too_near: int = 0
+    too_far: int = 0
+
+
+def _squares(pyramid: Pyramid, view: View | None) -> list[_Squares]:
+    """Of each height, from 0 on, by the errors that squares have at least."""
+    tree = pyramid.tree
+    every = [tree.nodes(tree.depth - height) for height in range(tree.depth + 1)]
+    if view is None:
+        return [_Squares(nodes, nodes) for nodes in every]
+    found, passed = [], passed_over(pyramid, view)
+    for height, (nodes, reached) in enumerate(zip(every, reached_by(pyramid, view), strict=True)):
+        kept = [node for node in reached if node not in passed]
+        made = kept
+        if not pyramid.instanced(height):  # others may be made of them
+            made = [node for node in nodes if node not in passed]
+        near = sum(node in passed for node in nodes)
+        found.append(_Squares(kept, made, near, len(nodes) - near - len(kept)))
+    return found
+
+
+def _estimated(
+    world: World, processes: int, progress: Progress, view: View | None
+) -> tuple[dict[str, Any], str]:
     pyramid, tree = world.pyramid, world.pyramid.tree
     counts = pyramid.placement.tiles.count
     shared_bytes, shared_s = 0, 0.0
@@ -56,29 +93,32 @@ def _estimated(world: World, processes: int, progress: Progress) -> tuple[dict[s
         for made in _made(world, SheetJob(height=pyramid.options.near)):
             shared_bytes += sum(made.entry.files.values())
             shared_s += sum(made.seconds.values())
-    times = sum(plants) / max(plants[sample], 1)
     top = tree.height(squares[0].node.level)
     levels = []
-    for height in range(tree.depth + 1):
-        nodes = tree.nodes(tree.depth - height)
+    for height, here in enumerate(_squares(pyramid, view)):
+        kept, anew = (
+            sum(int(counts[tree.tiles_of(node)].sum()) for node in nodes) / max(plants[sample], 1)
+            for nodes in (here.kept, here.made)
+        )
         if height <= top:
             own = [m for m in found if tree.height(int(m.entry.name.split("/")[0])) == height]
-            size = times * sum(sum(m.entry.files.values()) for m in own)
-            seconds = times * sum(sum(m.seconds.values()) for m in own)
+            size = kept * sum(sum(m.entry.files.values()) for m in own)
+            seconds = anew * sum(sum(m.seconds.values()) for m in own)
         elif pyramid.options.surfels:
-            size, seconds = SURFEL_BYTES * MOST * len(nodes), SURFELS_S * len(nodes)
+            size, seconds = SURFEL_BYTES * MOST * len(here.kept), SURFELS_S * len(here.made)
         else:
-            triangles = sum(pyramid.budget(node) for node in nodes)
-            size, seconds = FAR_BYTES * triangles, FAR_S * triangles / FAR_TRIANGLES
-        levels.append(
-            {
-                "height": height,
-                "side_m": tree.side_m * 2.0**height,
-                "tiles": len(nodes),
-                "bytes": round(size),
-                "seconds": round(seconds, 2),
-            }
-        )
+            size = FAR_BYTES * sum(map(pyramid.budget, here.kept))
+            seconds = FAR_S * sum(map(pyramid.budget, here.made)) / FAR_TRIANGLES
+        level: dict[str, Any] = {
+            "height": height,
+            "side_m": tree.side_m * 2.0**height,
+            "tiles": len(here.kept),
+            "bytes": round(size),
+            "seconds": round(seconds, 2),
+        }
+        if view is not None:
+            level |= {"too_near": here.too_near, "too_far": here.too_far}
+        levels.append(level)
     progress("tiles", 1.0)
     facts = {
         "plants_at_most": int(counts.sum()),
@@ -88,10 +128,13 @@ def _estimated(world: World, processes: int, progress: Progress) -> tuple[dict[s
         "seconds": round((shared_s + sum(level["seconds"] for level in levels)) / processes, 1),
         "levels": levels,
     }
+    if view is not None:
+        facts["scene"] = view.told
     return facts, _text(facts, processes)
 
 
 def _text(facts: dict[str, Any], processes: int) -> str:
+    head = ["tiles of", "tiles", "bytes", "seconds"]
     rows = [
         [
             f"{level['side_m']:,.4g} m",
@@ -101,11 +144,15 @@ def _text(facts: dict[str, Any], processes: int) -> str:
         ]
         for level in facts["levels"]
     ]
+    if "scene" in facts:
+        head += [TOO_NEAR, TOO_FAR]
+        for row, level in zip(rows, facts["levels"], strict=True):
+            row += [f"{level['too_near']:,}", f"{level['too_far']:,}"]
     many = f"{processes} processes" if processes > 1 else "one process"
     return (
         f"{facts['plants_at_most']:,} plants at most; {facts['tiles']:,} tiles, about "
         f"{human_bytes(facts['bytes'])} and {facts['seconds']:,.0f} s with {many}\n\n"
-        f"{table(['tiles of', 'tiles', 'bytes', 'seconds'], rows)}"
+        f"{table(head, rows)}"
     )
 
 

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from hashlib import file_digest
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,7 @@ from vegtool.tiles.make import (
     Chosen,
     Tile,
     chosen,
+    error_of,
     instanced_tile,
     merged_tile,
     reclustered_tile,
@@ -48,8 +50,8 @@ from vegtool.workers import check_stop
 TILES = "tiles"
 """Folder of the tiles, in that of the tileset."""
 SURFELS = "surfels"
-"""Kind of squares."""
-
+INSTANCES = "instances"
+"""Kinds of squares."""
 
 FATAL = (OutputError, UsageError, CapabilityError)
 """Errors that other parts would meet with, too: they end the run, which can go on later."""
@@ -84,22 +86,26 @@ class World:
 
 @dataclass(frozen=True)
 class Job:
-    """A part to make. known: what the journal has of what it makes."""
+    """A part to make. known: what the journal has of what it makes. facts: whether it is enough to
+    know what was made once, where the files are gone."""
 
     known: dict[str, Entry] = field(default_factory=dict, compare=False)
+    facts: bool = False
 
     def entry(self, name: str, key: str, out: Path) -> Entry | None:
         """What is made already."""
         entry = self.known.get(name)
-        return entry if entry and entry.key == key and entry.there(out) else None
+        return entry if entry and entry.key == key and (self.facts or entry.there(out)) else None
 
 
 @dataclass(frozen=True)
 class ModelJob(Job):
-    """A level of a species, for instances."""
+    """A level of a species, for instances. per_metre: pixels that no metre of it is seen as more
+    than."""
 
     kind: int = 0
     level: int = 0
+    per_metre: float = inf
 
 
 @dataclass(frozen=True)
@@ -111,9 +117,12 @@ class SheetJob(Job):
 
 @dataclass(frozen=True)
 class BlockJob(Job):
-    """A square, and all on it."""
+    """A square, and all on it: those of `made` are made, and those of `surveyed` looked at; all are
+    made if None."""
 
     node: Node = field(default=Node(0, 0, 0))
+    made: tuple[Node, ...] | None = None
+    surveyed: tuple[Node, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -141,6 +150,23 @@ class Made:
 
 
 @dataclass(frozen=True)
+class Surveyed:
+    """A square of instances that is not made yet: what would be told of it, and of each species and
+    level that it draws the largest scale."""
+
+    entry: Entry
+    scale: dict[tuple[int, int], float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Lacking:
+    """A part that would have to be made of others whose files are gone."""
+
+    node: Node
+    quarters: tuple[Node, ...]
+
+
+@dataclass(frozen=True)
 class Failed:
     """A part that is not. trace: where an error that vegtool does not know came from."""
 
@@ -150,7 +176,7 @@ class Failed:
     trace: str = ""
 
 
-Outcome = Made | Failed
+Outcome = Made | Failed | Surveyed | Lacking
 
 
 def world_of(inputs: Inputs, progress: Progress = silent, workers: int = 1) -> World:
@@ -245,11 +271,16 @@ def _failed(name: str, error: Exception) -> Failed:
 
 def _model(world: World, job: ModelJob) -> Iterator[Outcome]:
     name, shared = name_of(job), world.shared
+    seen = [job.per_metre] if isfinite(job.per_metre) else []
     key = key_of(
         shared.model_name(job.kind, job.level), world.pyramid.digest(job.kind, job.level),
-        world.pyramid.options.near_texture,
+        world.pyramid.options.near_texture, *seen,
     )  # fmt: skip
-    yield _shared(world, job, name, key, lambda: shared.model_files(job.kind, job.level))
+
+    def files() -> dict[str, bytes]:
+        return shared.model_files(job.kind, job.level, job.per_metre)
+
+    yield _shared(world, job, name, key, files)
 
 
 def _sheet(world: World, job: SheetJob) -> Iterator[Outcome]:
@@ -274,11 +305,14 @@ def _block(world: World, job: BlockJob) -> Iterator[Outcome]:
     tree, seconds = world.pyramid.tree, dict[str, float]()
     with timed(seconds, "placement"):
         stand = world.pyramid.stand(job.node)
-    squares = nodes_of(tree, job.node)
-    for node in squares:
+    squares = nodes_of(tree, job.node) if job.made is None else job.made
+    for node in (*squares, *job.surveyed):
         check_stop()
         try:
             own = stand if node == job.node else stand.on(tree.tiles_of(node))
+            if node in job.surveyed:
+                yield _surveyed(world, node, own)
+                continue
             made = _placed(world, job, node, own)
         except FATAL:
             raise
@@ -290,11 +324,34 @@ def _block(world: World, job: BlockJob) -> Iterator[Outcome]:
         yield made
 
 
+def _surveyed(world: World, node: Node, stand: Stand) -> Surveyed:
+    """What would be told of a square of instances."""
+    if not len(stand):
+        return Surveyed(_nothing(node))
+    how = chosen(world.pyramid, world.shared, node, stand)
+    scale: dict[tuple[int, int], float] = {}
+    for pair in _drawn(stand, how):
+        on = (stand.species == pair[0]) & (how.level == pair[1])
+        scale[pair] = float(stand.scale[on].max())
+    facts = {
+        "kind": INSTANCES,
+        "plants": len(stand),
+        "error_m": error_of(world.pyramid, stand, how.level),
+        "bounds": None,
+    }
+    return Surveyed(Entry(str(node), "", {}, facts), scale)
+
+
+def _nothing(node: Node) -> Entry:
+    """A square on which no plants turned out to stand."""
+    return Entry(str(node), key_of("none"), {}, {"plants": 0})
+
+
 def _placed(world: World, job: Job, node: Node, stand: Stand) -> Made:
     """A tile of the plants that stand on it."""
     pyramid, name = world.pyramid, str(node)
     if not len(stand):
-        return Made(Entry(name, key_of("none"), {}, {"plants": 0}), again=False)
+        return Made(_nothing(node), again=False)
     near = pyramid.instanced(pyramid.tree.height(node.level))
     if pyramid.options.surfels and not near:
         return _sampled(world, job, node, stand)
@@ -326,20 +383,25 @@ def _sampled(world: World, job: Job, node: Node, stand: Stand) -> Made:
     return _written(world, plants_tile(pyramid, world.shared, node, every, own), key)
 
 
-def _of_quarters(world: World, job: FarJob, quarters: Sequence[tuple[Node, Entry]]) -> Made:
+def _of_quarters(
+    world: World, job: FarJob, quarters: Sequence[tuple[Node, Entry]]
+) -> Made | Lacking:
     """Surfels of what its quarters' files hold."""
     from vegtool.tiles.surfel_squares import quarters_tile
 
-    pyramid, node, name = world.pyramid, job.node, str(job.node)
+    pyramid, node = world.pyramid, job.node
     if not quarters:
-        return Made(Entry(name, key_of("none"), {}, {"plants": 0}), again=False)
+        return Made(_nothing(node), again=False)
     key = key_of(
         SURFELS, pyramid.options.plain, *(entry.key for _, entry in quarters),
         *(pyramid.origin(one) - pyramid.origin(node) for one, _ in quarters),
     )  # fmt: skip
-    there = job.entry(name, key, world.out)
+    there = job.entry(str(node), key, world.out)
     if there is not None:
         return Made(there, again=False)
+    gone = _gone(world, quarters)
+    if gone:
+        return Lacking(node, gone)
     seconds: dict[str, float] = {}
     with timed(seconds, "quarters"):
         read = [(one, read_surfels_tile(world.out / file_of(one))) for one, _ in quarters]
@@ -356,7 +418,7 @@ def _tile(world: World, job: TileJob) -> Iterator[Outcome]:
     if len(stand) and pyramid.instanced(pyramid.tree.height(job.node.level)):
         how = chosen(pyramid, world.shared, job.node, stand)
         for kind, level in _drawn(stand, how):
-            yield from _model(world, ModelJob(job.known, kind, level))
+            yield from _model(world, ModelJob(job.known, kind=kind, level=level))
     made = _placed(world, job, job.node, stand)
     yield replace(made, seconds={**seconds, **made.seconds})
 
@@ -387,12 +449,21 @@ def _far(world: World, job: FarJob) -> Iterator[Outcome]:
     if there is not None:
         yield Made(there, again=False)
         return
+    gone = _gone(world, quarters)
+    if gone:
+        yield Lacking(node, gone)
+        return
     with timed(seconds, "quarters"):
         read = [(one, read_plant(world.out / file_of(one))) for one, _ in quarters]
     plants = sum(entry.facts["plants"] for _, entry in quarters)
     below_m = max(entry.facts["error_m"] or 0.0 for _, entry in quarters)
     tile = reclustered_tile(pyramid, node, read, plants, below_m)
     yield _written(world, replace(tile, seconds={**seconds, **tile.seconds}), key)
+
+
+def _gone(world: World, quarters: Sequence[tuple[Node, Entry]]) -> tuple[Node, ...]:
+    """Those whose files are not there."""
+    return tuple(one for one, entry in quarters if not entry.there(world.out))
 
 
 _DO: dict[type[Job], Any] = {

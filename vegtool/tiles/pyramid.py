@@ -110,6 +110,11 @@ class Pyramid:
         """Whether plants are instances of models."""
         return height < self.options.near
 
+    @property
+    def top(self) -> int:
+        """Height of the blocks, whose squares are made together."""
+        return min(self.options.near, self.tree.depth)
+
     def finest(self, height: int) -> int:
         """Level of which all others are coarser. The original is for the smallest tiles: it may
         repeat its textures, which merged groups cannot."""

@@ -7,15 +7,17 @@ from pathlib import Path
 from typing import Any
 
 from vegtool.console import human_bytes, table
+from vegtool.tiles.estimate import TOO_FAR, TOO_NEAR
 from vegtool.tiles.jobs import Failed, Made, World
 from vegtool.tiles.quadtree import Node
 
 
 def facts_of(
     world: World, made: Sequence[Made], failed: Mapping[str, Failed], out: Path,
-    files: Sequence[str], seconds: float,
+    files: Sequence[str], seconds: float, scene: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """What `--json` prints. files: with which clients begin, if they were written."""
+    """What `--json` prints. files: with which clients begin, if they were written. scene: what of a
+    scene the tileset is for, if of any."""
     tiles = [one for one in made if one.entry.facts.get("plants")]
     rows = [
         {
@@ -35,9 +37,10 @@ def facts_of(
     heights = sorted({row["height"] for row in rows})
     size = sum(sum(one.entry.files.values()) for one in made)
     size += sum((out / file).stat().st_size for file in files)
-    return {
+    plants = max((row["plants"] for row in rows), default=0)
+    facts = {
         "tileset": str(out / files[0]) if files else None,
-        "plants": max((row["plants"] for row in rows), default=0),
+        "plants": plants if scene is None else scene["plants"],
         "made": sum(one.again for one in tiles),
         "bytes": size,
         "shared_bytes": sum(sum(one.entry.files.values()) for one in made if not one.entry.facts),
@@ -47,6 +50,7 @@ def facts_of(
         "failed": {name: one.message for name, one in failed.items()},
         "notes": list(world.pyramid.notes),
     }
+    return facts if scene is None else {**facts, "scene": dict(scene)}
 
 
 def text_of(facts: Mapping[str, Any]) -> str:
@@ -72,7 +76,29 @@ def text_of(facts: Mapping[str, Any]) -> str:
         f"{where}: {facts['plants']:,} plants, {made:,} tiles{kept}, "
         f"{human_bytes(facts['bytes'])}, {facts['seconds']:,.1f} s"
     )
-    return f"{title}\n\n{table(head, rows)}" if rows else title
+    parts = [title, table(head, rows)] if rows else [title]
+    if facts.get("scene", {}).get("left_out"):
+        parts.append(left_out(facts["scene"]))
+    return "\n\n".join(parts)
+
+
+def left_out(scene: Mapping[str, Any]) -> str:
+    """What of a landscape no viewer of a scene is shown."""
+    head = ["left out of", "squares", TOO_NEAR, TOO_FAR, "with plants", "bytes, about"]
+    rows = [
+        [
+            f"{row['side_m']:,.4g} m",
+            f"{row['squares'] - row['kept']:,} of {row['squares']:,}",
+            f"{row['too_near']:,}",
+            f"{row['too_far']:,}",
+            f"{row['plants']:,}",
+            human_bytes(row["bytes"]),
+        ]
+        for row in scene["left_out"]
+    ]
+    models = scene["models"]
+    count = models["all"] - models["kept"]
+    return f"{table(head, rows)}\n\n{count:,} of {models['all']:,} models are left out as well"
 
 
 def _node(one: Made) -> Node:

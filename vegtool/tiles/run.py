@@ -12,9 +12,10 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from vegtool.errors import UsageError
-from vegtool.formats.tileset import TILESET, tileset_files
+from vegtool.formats.tileset import TILESET, TileEntry, tileset_files
 from vegtool.progress import Progress, silent
 from vegtool.tiles.jobs import (
     TILES,
@@ -22,6 +23,7 @@ from vegtool.tiles.jobs import (
     Failed,
     FarJob,
     Job,
+    Made,
     ModelJob,
     Outcome,
     SheetJob,
@@ -77,7 +79,7 @@ class Run:
         Raises OutputError where nothing can be written.
         """
         pyramid, out = self.world.pyramid, self.world.out
-        tree, top = pyramid.tree, _top(pyramid)
+        tree, top = pyramid.tree, pyramid.top
         self._all = _cost(pyramid)
         clean(out)
         with appended(out) as write:
@@ -95,7 +97,7 @@ class Run:
 
         Raises UsageError for one that is made of quarters which are not there.
         """
-        tree, top = self.world.pyramid.tree, _top(self.world.pyramid)
+        tree, top = self.world.pyramid.tree, self.world.pyramid.top
         jobs: list[Job] = []
         for node in nodes:
             if tree.height(node.level) <= top:
@@ -125,7 +127,7 @@ class Run:
         """
         pyramid, out = self.world.pyramid, self.world.out
         clean(out)  # of processes that were ended
-        root = tree_of(pyramid, self.found)
+        root = self._root()
         if root is None:
             if self.failed:
                 return []
@@ -135,9 +137,9 @@ class Run:
             )
         placed = pyramid.placed
         if pyramid.options.format == "glb":
-            files = {BEGINS["glb"]: index_json(pyramid, root, placed)}
+            files = {BEGINS["glb"]: index_json(pyramid, root, placed, self.told())}
         else:
-            files = tileset_files(root, placed)
+            files = tileset_files(root, placed, scene=self.told())
         begin = BEGINS[pyramid.options.format]
         names = [begin, *(name for name in files if name != begin)]
         for name in reversed(names):
@@ -146,6 +148,18 @@ class Run:
         self._forget()
         write_journal(out, self.found)
         return names
+
+    def told(self) -> dict[str, Any] | None:
+        """What of a scene the tileset is made for; None where it is for any."""
+        return None
+
+    def shown(self, made: Sequence[Made]) -> list[Made]:
+        """Of what was made, what the tileset has."""
+        return list(made)
+
+    def _root(self) -> TileEntry | None:
+        """What the tileset is to have; None where no plants turned out to stand anywhere."""
+        return tree_of(self.world.pyramid, self.found)
 
     def _sheets(self, nodes: Sequence[Node]) -> list[SheetJob]:
         """What tiles that were made are drawn with, where any is merged."""
@@ -163,7 +177,7 @@ class Run:
             for outcome in outcomes or [Failed(name, f"{called(name)}: {LOST}")]:
                 if isinstance(outcome, Failed):
                     self.failed[outcome.name] = outcome
-                else:
+                elif isinstance(outcome, Made):
                     self.found[outcome.entry.name] = outcome.entry
                     if outcome.again:
                         write(outcome.entry)
@@ -216,11 +230,6 @@ def clean(folder: Path) -> None:
             part.unlink(missing_ok=True)
 
 
-def _top(pyramid: Pyramid) -> int:
-    """Height of the blocks."""
-    return min(pyramid.options.near, pyramid.tree.depth)
-
-
 def models(pyramid: Pyramid) -> list[Job]:
     near = range(min(pyramid.options.near, pyramid.tree.depth + 1))
     pairs = {pair for height in near for pair in used_levels(pyramid, height)}
@@ -229,12 +238,12 @@ def models(pyramid: Pyramid) -> list[Job]:
 
 def blocks(pyramid: Pyramid) -> list[BlockJob]:
     tree = pyramid.tree
-    return [BlockJob(node=node) for node in tree.nodes(tree.depth - _top(pyramid))]
+    return [BlockJob(node=node) for node in tree.nodes(tree.depth - pyramid.top)]
 
 
 def _cost(pyramid: Pyramid) -> float:
     """Of all jobs."""
-    tree, top = pyramid.tree, _top(pyramid)
+    tree, top = pyramid.tree, pyramid.top
     far = sum(tree.count(level) for level in range(tree.depth - top))
     return (
         COST[ModelJob] * len(models(pyramid))

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import inf
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +25,7 @@ from vegtool.tiles.levels import COARSEST, fitting
 from vegtool.tiles.pyramid import Pyramid, used_levels
 from vegtool.tiles.quadtree import Node
 from vegtool.tiles.sheet import Sheet, sheet_of
-from vegtool.tiles.textures import limited
+from vegtool.tiles.textures import limited, resolved
 
 FOLDER = "shared"
 """In that of the tiles: readers that keep to a file's own folder find it too."""
@@ -70,9 +71,11 @@ class Shared:
         """Of a species' level. Not _LOD1: beside a node of that name, readers leave out others."""
         return f"{self._names[kind]}_{level}"
 
-    def model_files(self, kind: int, level: int) -> dict[str, bytes]:
-        """A level's files, by their names in FOLDER."""
+    def model_files(self, kind: int, level: int, per_metre: float = inf) -> dict[str, bytes]:
+        """A level's files, by their names in FOLDER; without texels that are not seen where no
+        metre of it is more than so many pixels."""
         plant = limited(self.pyramid.species[kind].levels[level], self.pyramid.options.near_texture)
+        plant = resolved(plant, per_metre)
         return model_files(plant, self.model_name(kind, level))
 
     def model(self, kind: int, level: int) -> SharedModel:

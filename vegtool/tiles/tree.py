@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -31,7 +32,7 @@ def tree_of(pyramid: Pyramid, found: Mapping[str, Entry]) -> TileEntry | None:
 
 def _entry(pyramid: Pyramid, node: Node, found: Mapping[str, Entry]) -> TileEntry | None:
     tree, own = pyramid.tree, found.get(str(node))
-    if own is not None and not own.files:
+    if own is not None and not own.facts["plants"]:
         return None  # no plants turned out to stand there
     quarters = tree.quarters(node)
     below = [one for one in (_entry(pyramid, q, found) for q in quarters) if one is not None]
@@ -69,8 +70,14 @@ def _complete(found: Mapping[str, Entry], pyramid: Pyramid, node: Node) -> bool:
     return bool(quarters) and all(_complete(found, pyramid, one) for one in quarters)
 
 
-def index_json(pyramid: Pyramid, root: TileEntry, placed: FloatArray | None) -> bytes:
-    """A list of the tiles, each after the square that it is on, for readers of their own.
+def index_json(
+    pyramid: Pyramid,
+    root: TileEntry,
+    placed: FloatArray | None,
+    scene: Mapping[str, Any] | None = None,
+) -> bytes:
+    """A list of the tiles, each after the square that it is on, for readers of their own; and what
+    of a scene it is made for, if of any.
 
     Metres in the scene's frame, y up, but for `earth_from_scene`, whose columns take the scene's
     frame turned z up to the earth's.
@@ -94,9 +101,11 @@ def index_json(pyramid: Pyramid, root: TileEntry, placed: FloatArray | None) -> 
             add(child, number)
 
     add(root, None)
-    values = {
+    values: dict[str, Any] = {
         "generator": f"vegtool {vegtool.__version__}",
         "earth_from_scene": None if placed is None else placed.T.ravel().tolist(),
         "tiles": tiles,
     }
+    if scene is not None:
+        values["scene"] = dict(scene)
     return (json.dumps(values, allow_nan=False, separators=(",", ":")) + "\n").encode()

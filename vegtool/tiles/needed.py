@@ -1,0 +1,95 @@
+"""Which squares of a landscape the viewers of a scene can ever be shown.
+
+Source: OGC 22-025r4, 3D Tiles 1.1, section 6.3: clients draw a tile until its error, seen from the
+nearest point of its box, is more than some pixels, and then its quarters in its place.
+
+A square all of whose eyes see more of an error than that is never drawn, nor is one that it lies
+on: those have larger errors, and nearer boxes. A square of which no eye does is a leaf.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from vegtool.arrays import FloatArray
+from vegtool.formats.tileset import BLENDED, CLIENT_PX, TileEntry
+from vegtool.tiles.pyramid import Pyramid
+from vegtool.tiles.quadtree import Node
+from vegtool.tiles.view import View
+
+
+def passed_over(pyramid: Pyramid, view: View) -> frozenset[Node]:
+    """The squares that no client draws, as all eyes are so near to them that their quarters are
+    drawn: by the errors that they have at least, in boxes that they fill at least."""
+    found: set[Node] = set()
+    front = pyramid.tree.nodes(0)
+    while front:
+        error = np.array([pyramid.error_m(pyramid.tree.height(one.level)) for one in front])
+        passed = view.passed(_boxes(pyramid, front), error)
+        here = [one for one, is_passed in zip(front, passed, strict=True) if is_passed]
+        found.update(here)
+        front = [quarter for one in here for quarter in pyramid.tree.quarters(one)]
+    return frozenset(found)
+
+
+def reached_by(pyramid: Pyramid, view: View) -> list[list[Node]]:
+    """The squares that clients may draw, or draw the quarters of, by the errors that they have at
+    least: of each height, from 0 on. Where greater errors are measured, there are more."""
+    tree = pyramid.tree
+    found = [tree.nodes(0)]
+    for level in range(tree.depth):
+        height = tree.height(level)
+        error = np.full(len(found[-1]), pyramid.error_m(height))
+        surfels = pyramid.options.surfels and not pyramid.instanced(height)
+        seen = np.full(len(error), gives_way_px(surfels))
+        on = np.zeros(0, np.bool_)
+        if found[-1]:
+            on = view.refined(_boxes(pyramid, found[-1]), error, seen)
+        parents = [one for one, refined in zip(found[-1], on, strict=True) if refined]
+        found.append([quarter for one in parents for quarter in tree.quarters(one)])
+    return found[::-1]
+
+
+def gives_way_px(surfels: bool) -> float:
+    """Pixels of error from which on a square's quarters are drawn: of surfels beside its own."""
+    return CLIENT_PX / (1 + BLENDED) if surfels else CLIENT_PX
+
+
+def pruned(root: TileEntry, view: View) -> TileEntry:
+    """A tileset without the tiles that no client goes on to from any eye, and without those on top
+    that have no content and a single child."""
+    leaves: set[int] = set()
+    front: Sequence[TileEntry] = [root]
+    while front:
+        boxes = np.stack([one.bounds for one in front])
+        error = np.array([one.error_m for one in front])
+        seen = np.array([gives_way_px(one.surfels > 0) for one in front])
+        on = view.refined(boxes, error, seen) | np.array([one.uri is None for one in front])
+        leaves.update(id(one) for one, refined in zip(front, on, strict=True) if not refined)
+        front = [
+            child for one, refined in zip(front, on, strict=True) if refined
+            for child in one.children
+        ]  # fmt: skip
+
+    def kept(tile: TileEntry) -> TileEntry:
+        below = () if id(tile) in leaves else tuple(map(kept, tile.children))
+        return replace(tile, children=below)
+
+    root = kept(root)
+    while root.uri is None and len(root.children) == 1:
+        (root,) = root.children
+    return root
+
+
+def contents_of(root: TileEntry) -> set[str]:
+    """The files of a tileset's tiles."""
+    own = set() if root.uri is None else {root.uri}
+    return own.union(*map(contents_of, root.children))
+
+
+def _boxes(pyramid: Pyramid, nodes: Sequence[Node]) -> FloatArray:
+    """(n, 2, 3)."""
+    return np.stack([pyramid.bounds(node) for node in nodes])
