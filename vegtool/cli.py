@@ -502,6 +502,55 @@ def tiles_command(
         raise typer.Exit(result.exit_code)
 
 
+@app.command("plan")
+@flags
+def plan_command(
+    *,
+    scene: Annotated[
+        Path, typer.Argument(help="A scene file with cameras.", metavar="SCENE.toml", parser=_path)
+    ],
+    species: Annotated[
+        Path,
+        typer.Option(
+            "--species",
+            help="Folder of its plants, converted or as models.",
+            metavar="FOLDER",
+            parser=_path,
+        ),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "-o",
+            "--out",
+            help="Write the plan to this file too.",
+            metavar="FILE.json",
+            parser=_path,
+        ),
+    ] = None,
+    force: Force = False,
+    json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = 0,
+    config: Config = None,
+) -> None:
+    """Say what of its plants a scene's viewers can ever see, and what can be left out.
+
+    [bold]Examples[/bold]
+
+        vegtool plan scene.toml --species library/
+
+        vegtool plan scene.toml --species library/ -o plan.json
+    """
+    from vegtool.plan.command import run_plan
+
+    console = Console(-1 if quiet else verbose, json)
+    result = run_plan(scene, species, out, force, console.bar)
+    for note in result.notes:
+        console.say(note)
+    console.result(result.facts, result.text)
+
+
 @app.command("doctor")
 def doctor_command(*, json: Json = False) -> None:
     """Check what this machine can do, with the remedy where something is missing."""

@@ -10,7 +10,6 @@ from vegtool.lod import Display, Level
 from vegtool.measure.pictures import uploaded
 from vegtool.measure.scores import scores, truths
 from vegtool.measure.views import views
-from vegtool.plant import Plant
 from vegtool.progress import Progress, silent
 from vegtool.tiles.library import Species
 
@@ -37,14 +36,11 @@ def level_errors(
     with PlantBuffers(original) as buffers:
         truth = truths(original, views(kind, VIEWS), asked.tolist(), display, buffers=buffers)
     known = [int(np.abs(truth.pixels - size).argmin()) for size in asked]
-    levels = [*species.levels, *([] if species.surfels is None else [species.surfels.read()])]
-    for index, level in enumerate(levels):
+    levels = [Level("mesh", mesh=plant) for plant in species.levels]
+    if species.surfels is not None:
+        levels.append(Level("surfels", surfels=species.surfels.read()))
+    for index, shown in enumerate(levels):
         progress(f"{species.name}: errors", index / len(levels))
-        shown = (
-            Level("mesh", mesh=level)
-            if isinstance(level, Plant)
-            else Level("surfels", surfels=level, unlit=level.unlit)
-        )
         with uploaded(shown) as drawn:
             flip = scores(truth, drawn).values["flip"].mean(axis=1)
         found.append(flip[known][back])
