@@ -25,6 +25,8 @@ sine of the turn about y, radius of the discs in that unit, factor of the width.
 linear factors of 0 to 2."""
 AS_IT_IS = (127, 127, 127, 255)
 """A tint, nearly."""
+GROUPS_PER_DOUBLING = 4
+"""Of prefix lengths, drawn together: none is drawn longer than by a fifth."""
 PER_SURFEL = (("in_position", 3), ("in_normal", 3), ("in_color", 3), ("in_size", 1))
 """Attributes: name and floats."""
 PER_INSTANCE = (("in_place", "4f", 0), ("in_turn_size", "4f", 16), ("in_tint", "4f1", 32))
@@ -95,12 +97,12 @@ class SurfelSetBuffers(OnGpu):
     def draw(
         self, rows: np.ndarray, prefix: IntArray, shot: Shot, light: Light, view: View = "lit",
         footprint: float = 1.0,
-    ) -> int:  # fmt: skip
+    ) -> tuple[int, int]:  # fmt: skip
         """Draw the first `prefix` (n,) surfels at each of n places into the framebuffer in use,
-        which has depth; returns how many in all.
+        which has depth; returns draw calls, and how many surfels in all.
 
         shot: its target is the eye. footprint: samples per pixel and axis. Places whose prefixes
-        are alike to a power of two are one call, and have as many as the longest.
+        are alike (GROUPS_PER_DOUBLING) are one call, and have as many as the longest.
         """
         defines = {
             "UNLIT": self.surfels.unlit, "DOUBLE_SIDED": self.surfels.double_sided,
@@ -128,8 +130,10 @@ class SurfelSetBuffers(OnGpu):
         count = np.minimum(prefix[order], len(self.surfels.position))
         self._rows = rewritten(self._rows, rows[order])
         self.ctx.enable(moderngl.PROGRAM_POINT_SIZE)
-        starts = np.flatnonzero(np.diff(np.ceil(np.log2(count)), prepend=np.inf))
-        sent = 0
+        starts = np.flatnonzero(
+            np.diff(np.ceil(GROUPS_PER_DOUBLING * np.log2(count)), prepend=np.inf)
+        )
+        calls = sent = 0
         for first, end in zip(starts, np.append(starts[1:], len(count)), strict=False):
             most = int(count[first])
             at_once = max(self._pace.most // most, 1)
@@ -138,19 +142,15 @@ class SurfelSetBuffers(OnGpu):
                 array = self._array(shader, row)
                 array.render(moderngl.POINTS, vertices=most, instances=part)
                 self._pace.sent(most * part)
+                calls += 1
                 sent += most * part
         self.ctx.disable(moderngl.PROGRAM_POINT_SIZE)
-        return sent
+        return calls, sent
 
     def _array(self, shader: moderngl.Program, first: int) -> moderngl.VertexArray:
         if shader not in self._arrays:
             layout, names = [], []
-            for name, many in (
-                ("in_position", 3),
-                ("in_normal", 3),
-                ("in_color", 3),
-                ("in_size", 1),
-            ):
+            for name, many in PER_SURFEL:
                 layout.append(f"{many}f" if name in shader else f"{4 * many}x")
                 names += [name] if name in shader else []
             content = [(self._vertices, " ".join(layout), *names)]
