@@ -9,7 +9,7 @@ the candidates.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
@@ -101,12 +101,12 @@ def discs_of(surfels: SurfelSet) -> Discs:
 def together(some: Sequence[Discs]) -> Discs:
     """All discs of several, one at least, in order. Their tint is the mean of theirs, by how much
     light passes through each."""
-    columns = (
-        np.concatenate([getattr(one, name) for one in some])
-        for name in ("position", "normal", "color", "radius", "size")
-    )
+    every = Discs(
+        *(np.concatenate([getattr(one, name) for one in some])
+          for name in ("position", "normal", "color", "radius", "size"))
+    )  # fmt: skip
     if all(one.light is None for one in some):
-        return Discs(*columns)
+        return every
     lights = [np.tile(ALL_LIGHT, (len(one), 1)) if one.light is None else one.light for one in some]
     passing = np.array(
         [light[:, 2] @ one.radius**2 for one, light in zip(some, lights, strict=True)]
@@ -114,7 +114,7 @@ def together(some: Sequence[Discs]) -> Discs:
     tint = np.ones(3)
     if passing.sum() > 0:
         tint = passing @ np.array([one.transmission_tint for one in some]) / passing.sum()
-    return Discs(*columns, light=np.concatenate(lights), transmission_tint=tint)
+    return replace(every, light=np.concatenate(lights), transmission_tint=tint)
 
 
 def outside(discs: Discs) -> npt.NDArray[np.bool_]:
