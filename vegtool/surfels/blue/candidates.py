@@ -175,6 +175,9 @@ def seen_from(
     light = None
     if lit is None and has_light(plant):
         light = np.column_stack([seen.exposure, seen.transmission]).astype(np.float64).clip(0, 1)
+        if any(material.double_sided for material in plant.materials):
+            away = seen.normal @ direction < 0  # as of a crown's leaves; it is drawn turned round
+            light[away, :2] = light[away, 1::-1]
     return Candidates(
         seen.position, seen.normal.astype(np.float64), seen.color.astype(np.float64),
         plant.face_material[seen.face], 2 * radius / resolution, light,
