@@ -191,7 +191,8 @@ class ConvertOptions:
     )
     quantized: bool = option(
         False,
-        "Surfels as 24 bytes each, not 36, for clients that know KHR_mesh_quantization.",
+        "Surfels as 24 bytes each, not 36 (4 more with light of their own), for clients that know "
+        "KHR_mesh_quantization.",
     )
     max_texture: int = option(
         BakeOptions().max_texture, "Largest side of an atlas, in texels.", least=16, most=16384
