@@ -27,8 +27,13 @@ AS_IT_IS = (127, 127, 127, 255)
 """A tint, nearly."""
 GROUPS_PER_DOUBLING = 4
 """Of prefix lengths, drawn together: none is drawn longer than by a fifth."""
-PER_SURFEL = (("in_position", 3), ("in_normal", 3), ("in_color", 3), ("in_size", 1))
-"""Attributes: name and floats."""
+PER_SURFEL = (
+    ("in_position", "3f", "f4", 3), ("in_normal", "3f", "f4", 3), ("in_color", "3f", "f4", 3),
+    ("in_size", "1f", "f4", 1),
+)  # fmt: skip
+"""Attributes: name, format, and how that is stored: type and number."""
+LIGHT = (("in_light", "4f1", "u1", 4),)
+"""What surfels with light of their own have further; the last byte is 0."""
 PER_INSTANCE = (("in_place", "4f", 0), ("in_turn_size", "4f", 16), ("in_tint", "4f1", 32))
 """Attributes: name, format and offset."""
 
@@ -43,8 +48,14 @@ class SurfelSetBuffers(OnGpu):
         self.center = (low + high) / 2
         self.unit = float(np.linalg.norm(high - low) / 2) or 1.0
         local = (surfels.position - self.center) / self.unit
-        rows = np.column_stack([local, surfels.normal, surfels.color, surfels.size])
-        self._vertices = self.ctx.buffer(rows.astype(np.float32).tobytes())
+        columns = [local, surfels.normal, surfels.color, surfels.size[:, None]]
+        if surfels.light is not None:
+            columns.append(np.pad(np.rint(255 * surfels.light), ((0, 0), (0, 1))))
+        self._attributes = PER_SURFEL + (() if surfels.light is None else LIGHT)
+        rows = np.empty(len(surfels), [(name, kind, (n,)) for name, _, kind, n in self._attributes])
+        for (name, *_), column in zip(self._attributes, columns, strict=True):
+            rows[name] = column
+        self._vertices = self.ctx.buffer(rows)
         self._rows = self.ctx.buffer(reserve=POINT_INSTANCE.itemsize, dynamic=True)
         self._arrays: dict[moderngl.Program, moderngl.VertexArray] = {}
         self._pace = Pace(self.ctx)
@@ -106,6 +117,7 @@ class SurfelSetBuffers(OnGpu):
         """
         defines = {
             "UNLIT": self.surfels.unlit, "DOUBLE_SIDED": self.surfels.double_sided,
+            "LIGHT": self.surfels.light is not None,
             "PAINTED": view == "painted",
             "SOFT_EDGES": self.ctx.fbo.samples > 0,
             f"OVERDRAW {OVERDRAW_STEP}": view == "overdraw",
@@ -121,6 +133,7 @@ class SurfelSetBuffers(OnGpu):
             ("right", tuple(pixel[0])),
             ("up", tuple(pixel[1])),
             ("size", size),
+            ("transmission_tint", tuple(self.surfels.transmission_tint)),
         ):
             if name in shader:
                 shader[name] = value
@@ -150,8 +163,9 @@ class SurfelSetBuffers(OnGpu):
     def _array(self, shader: moderngl.Program, first: int) -> moderngl.VertexArray:
         if shader not in self._arrays:
             layout, names = [], []
-            for name, many in PER_SURFEL:
-                layout.append(f"{many}f" if name in shader else f"{4 * many}x")
+            for name, form, kind, count in self._attributes:
+                unused = f"{count * np.dtype(kind).itemsize}x"
+                layout.append(form if name in shader else unused)
                 names += [name] if name in shader else []
             content = [(self._vertices, " ".join(layout), *names)]
             self._arrays[shader] = self.ctx.vertex_array(shader, content)

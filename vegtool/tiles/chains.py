@@ -101,8 +101,8 @@ def make(work: Work, progress: Progress = silent) -> tuple[str, ...]:
 
 def joined(manifests: Sequence[Path]) -> Species:
     """A plant whose levels are told by several manifests, each going on from where the one before
-    ends: what is first in it is not drawn. Surfels follow all of them. Levels are read when they are
-    asked for.
+    ends: what is first in it is not drawn. Surfels follow all of them. Levels are read when they
+    are asked for.
 
     Raises InputError for what is missing or broken.
     """
