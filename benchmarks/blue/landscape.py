@@ -53,8 +53,8 @@ KINDS = {
 """By name: the sample, its triangles and seed, and heights, metres."""
 SIZES = ((1920, 1080), (960, 540))
 """Pixels of pictures; the first is compared."""
-PROCESSES = 2
-"""That make tiles."""
+PROCESSES, TILE_M = 2, 128
+"""That make tiles; metres, side of the smallest, so that there are not thousands."""
 FRAMES = 5
 """Timed, of which the median counts; of trees that are whole, one."""
 CROPS, CROP_PX = 60, (24, 400)
@@ -249,7 +249,8 @@ def tiled(cache: Path, say: Say) -> TileForest:
     """The landscape as tiles of surfels, which are made where they were not before."""
     out = cache / f"tiles_{key_of(KINDS, TREES, EXTENT_M)}"
     if not (out / "tileset.json").exists():
-        made = tiles(scene(cache / "scene"), library(cache, SURFELS), out, PROCESSES, "--surfels")
+        words = "--surfels", "--tile", str(TILE_M)
+        made = tiles(scene(cache / "scene"), library(cache, SURFELS), out, PROCESSES, *words)
         size = sum(file.stat().st_size for file in out.rglob("*") if file.is_file())
         say(f"tiles: {made.seconds:.0f} s, {made.peak_mb:,} MB peak, {size / 1e6:.0f} MB")
     place = read_tile_world(out / "tileset.json")
