@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
-from time import perf_counter
+from time import process_time
 
 import numpy as np
 from landscape.making import tiles
@@ -75,7 +75,7 @@ Part = tuple[slice, slice]
 
 @dataclass(frozen=True)
 class Row:
-    """A view drawn in one way. hierarchical, ssim, flip: of the whole picture, four samples a
+    """A view drawn in one way. milliseconds: of the processor. hierarchical, ssim, flip: of the whole picture, four samples a
     pixel as the preview has. crops: mean hierarchical similarity of parts with one tree. fine: the
     same of a picture that has as many samples as the truth."""
 
@@ -258,18 +258,18 @@ def tiled(cache: Path, say: Say) -> TileForest:
 
 
 def timed(forest: Scenery, eye: Eye, size: tuple[int, int], look: Look) -> Row:
-    """Median time of FRAMES frames after one that is not counted; of a single one of trees that
-    are whole, which takes minutes."""
+    """Median time of the processor, of all threads, of FRAMES frames after one that is not counted;
+    of a single one of trees that are whole, which takes minutes."""
     ctx, once = context(), look.level is not None
     with framebuffer_kept(ctx), Screen(ctx) as screen:
         seconds = []
         for _ in range(1 if once else FRAMES + 1):
-            since = perf_counter()
+            since = process_time()
             screen.begin(size, (0.0, 0.0, 0.0))
             stats = forest.draw(eye, size, look)
             screen.resolve()
             screen.ctx.finish()
-            seconds.append(perf_counter() - since)
+            seconds.append(process_time() - since)
     surfels = int(stats.said[0].split()[0].replace(",", "")) if stats.said else 0
     median = 1e3 * float(np.median(seconds if once else seconds[1:]))
     return Row("", "", size[0], median, stats.draws, stats.triangles, surfels)

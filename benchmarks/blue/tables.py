@@ -225,7 +225,7 @@ def landscape_table(found: Sequence[Row]) -> Rows:
         row: dict[str, Any] = {"view": one.view, "drawn": one.drawn}
         for width, height in PICTURES:
             seconds = at[one.view, one.drawn, width].milliseconds / 1e3
-            row[f"seconds, {width} x {height}"] = f"{seconds:.1f}"
+            row[f"cpu seconds, {width} x {height}"] = f"{seconds:.1f}"
         row |= {"draws": one.draws, "triangles": f"{one.triangles:,}"}
         row |= {"surfels": f"{one.surfels:,}"}
         for key in ("hierarchical", "ssim", "flip", "crops", "fine"):
