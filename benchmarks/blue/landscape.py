@@ -75,9 +75,9 @@ Part = tuple[slice, slice]
 
 @dataclass(frozen=True)
 class Row:
-    """A view drawn in one way. milliseconds: of the processor. hierarchical, ssim, flip: of the whole picture, four samples a
-    pixel as the preview has. crops: mean hierarchical similarity of parts with one tree. fine: the
-    same of a picture that has as many samples as the truth."""
+    """A view drawn in one way. milliseconds: of the processor. hierarchical, ssim, flip: of the
+    whole picture, four samples a pixel as the preview has. crops: mean hierarchical similarity of
+    parts with one tree. fine: the same of a picture that has as many samples as the truth."""
 
     view: str
     drawn: str
