@@ -76,7 +76,7 @@ def test_files_tell_what_a_viewer_needs(tmp_path: Path) -> None:
         ({"points": 10}, "--points: is of another method"),
         ({"method": "surfels", "billboards": 10}, "--billboards: says nothing of surfels"),
         ({"method": "surfels", "pixels": 10.0}, "--pixels: says nothing of surfels"),
-        ({"method": "surfels", "occlusion": 1.0}, "--occlusion: says nothing of surfels"),
+        ({"method": "surfels", "max_texture": 512}, "--max-texture: says nothing of surfels"),
         ({"method": "surfels", "refine": "none"}, "goes with --refine full"),
         ({"method": "surfel-billboards", "quantized": True}, "--quantized: is of another method"),
     ],

@@ -13,6 +13,10 @@ import numpy.typing as npt
 
 from vegtool.arrays import FloatArray, IntArray, checked
 
+ALL_LIGHT = (1.0, 1.0, 0.0)
+"""The light of surfels of which nothing is known: all of the sky's, and none that passes
+through."""
+
 
 @dataclass(frozen=True)
 class Spacing:
@@ -53,6 +57,9 @@ class SurfelSet:
     of a prefix have, with which each covers no more than what it stands for. unlit: colours are
     what is seen; clients add no light. double_sided: seen from behind, normals turn round, as on
     leaves; otherwise a surfel stands for what is before it, of something solid.
+    light: (n, 3), 0 to 1: how much of the sky's light reaches the side of the normal and the
+    other, and how much light passes through, in the colour times transmission_tint, (3,). Or None
+    where all does and none passes, and of unlit ones.
     """
 
     position: FloatArray
@@ -62,6 +69,8 @@ class SurfelSet:
     size: FloatArray = field(default_factory=lambda: np.ones(1))
     unlit: bool = False
     double_sided: bool = True
+    light: FloatArray | None = None
+    transmission_tint: FloatArray = field(default_factory=lambda: np.ones(3))
 
     def __post_init__(self) -> None:
         position = checked("SurfelSet.position", self.position, (None, 3), np.float64)
@@ -75,6 +84,15 @@ class SurfelSet:
         if not ((size >= 0) & (size <= 1)).all():
             raise ValueError("SurfelSet.size: expected 0 to 1")
         object.__setattr__(self, "size", size)
+        if self.light is not None:
+            light = checked("SurfelSet.light", self.light, position.shape, np.float64)
+            if not ((light >= 0) & (light <= 1)).all():
+                raise ValueError("SurfelSet.light: expected 0 to 1")
+            if self.unlit:
+                raise ValueError("SurfelSet.light: expected none beside light in the colours")
+            object.__setattr__(self, "light", light)
+        tint = checked("SurfelSet.transmission_tint", self.transmission_tint, (3,), np.float64)
+        object.__setattr__(self, "transmission_tint", tint)
         if self.spacing.total != len(position):
             raise ValueError(
                 f"SurfelSet.spacing: expected that of {len(position)}; is of {self.spacing.total}"
@@ -88,6 +106,16 @@ class SurfelSet:
         """(2, 3) metres: least and greatest coordinates of positions."""
         return np.stack([self.position.min(axis=0), self.position.max(axis=0)])
 
+    @property
+    def exposure(self) -> FloatArray:
+        """(n, 2) how much of the sky's light reaches the side of the normal, and the other."""
+        return np.ones((len(self), 2)) if self.light is None else self.light[:, :2]
+
+    @property
+    def transmission(self) -> FloatArray:
+        """(n,) share of light that passes through."""
+        return np.zeros(len(self)) if self.light is None else self.light[:, 2]
+
     def first(self, count: int) -> SurfelSet:
         """The set of a prefix, `count` surfels or all."""
         return self.of(slice(count), replace(self.spacing, total=min(count, len(self))))
@@ -100,6 +128,7 @@ class SurfelSet:
             normal=self.normal[rows],
             color=self.color[rows],
             size=self.size[rows],
+            light=None if self.light is None else self.light[rows],
             spacing=spacing,
         )
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import product
 from pathlib import Path
 
 from PIL import Image, ImageDraw, ImageFont
 
+from blue.landscape import SHOWN_PX
 from blue.orders import Orders
 from blue.prefixes import MODELS, PREFIXES, Scores, Shown
 from vegtool.arrays import Picture
@@ -97,6 +99,26 @@ def sheet(file: Path, found: Mapping[str, Sequence[Shown]]) -> None:
             if column < len(small):
                 paper.paste(small[column], (left, top + LINE + high + GAP))
         top += LINE + high + GAP + low + 2 * GAP
+    paper.save(file, quality=QUALITY)
+
+
+def parts_of(file: Path, found: Mapping[tuple[str, str], Picture]) -> None:
+    """Of each view, a row of the same part of it, drawn in each way; the truth first."""
+    (width, height), drawn = SHOWN_PX, ["truth"]
+    drawn += [name for _, name in found if name not in ("truth", "whole")]
+    drawn, views = list(dict.fromkeys(drawn)), list(dict.fromkeys(view for view, _ in found))
+    size = (
+        GAP + len(drawn) * (width + GAP),
+        GAP + len(views) * (LINE + height + GAP),
+    )
+    paper = Image.new("RGB", size, PAPER)
+    pen, font = ImageDraw.Draw(paper), ImageFont.load_default(14)
+    for (i, view), (j, name) in product(enumerate(views), enumerate(drawn)):
+        left, top = GAP + j * (width + GAP), GAP + i * (LINE + height + GAP)
+        whole = Image.fromarray(bytes_over(found[view, name]))
+        x, y = (whole.width - width) // 2, (whole.height - height) // 2
+        pen.text((left, top), f"{view}, {name}", fill=INK, font=font)
+        paper.paste(whole.crop((x, y, x + width, y + height)), (left, top + LINE))
     paper.save(file, quality=QUALITY)
 
 

@@ -12,11 +12,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
-from time import perf_counter
+from time import process_time
 
 import numpy as np
+from landscape.making import tiles
 from walk.scenes import Say, first_levels, key_of
-from walk.truth import Whole
+from walk.truth import SUPERSAMPLE, Whole
 
 from blue.similarity import hierarchical
 from vegtool.arrays import Picture, SingleArray
@@ -31,7 +32,9 @@ from vegtool.measure.background import over
 from vegtool.measure.metrics import LUMINANCE, reference, score
 from vegtool.preview.eye import Eye
 from vegtool.preview.forest import Forest
-from vegtool.preview.scenery import IN_FULL, Look
+from vegtool.preview.scenery import IN_FULL, Look, Scenery
+from vegtool.preview.tile_forest import TileForest
+from vegtool.preview.tile_world import read_tile_world
 from vegtool.preview.world import World, read_world
 from vegtool.seeding import generator
 from vegtool.srgb import srgb_from_linear
@@ -50,21 +53,31 @@ KINDS = {
 """By name: the sample, its triangles and seed, and heights, metres."""
 SIZES = ((1920, 1080), (960, 540))
 """Pixels of pictures; the first is compared."""
+PROCESSES, TILE_M = 2, 128
+"""That make tiles; metres, side of the smallest, so that there are not thousands."""
 FRAMES = 5
 """Timed, of which the median counts; of trees that are whole, one."""
 CROPS, CROP_PX = 60, (24, 400)
 """Trees that are looked at by themselves, at most, and heights of theirs in pixels."""
-AHEAD_M = 1.5
-"""A walker's eye is no nearer to a crown."""
+SHOWN_PX = (640, 360)
+"""Of the middle of a picture, shown on the page."""
+HIDDEN = 0.25
+"""Of such a part, at most, is hidden by the parts of trees that are nearer."""
 
 SURFELS = ConvertOptions(method="surfels", levels=1)
 BILLBOARDS = ConvertOptions(levels=8, billboards=1024)
 
+LANDSCAPE_ASKED = {"overview": 0.85, "ground": 0.95}
+"""Of hierarchical similarity, at least; the paper's are 0.68 and 0.9."""
+Part = tuple[slice, slice]
+"""Rows and columns of a picture."""
+
 
 @dataclass(frozen=True)
 class Row:
-    """A view drawn in one way. hierarchical, ssim, flip: of the whole picture. crops: mean
-    hierarchical similarity of parts with one tree."""
+    """A view drawn in one way. milliseconds: of the processor. hierarchical, ssim, flip: of the
+    whole picture, four samples a pixel as the preview has. crops: mean hierarchical similarity of
+    parts with one tree. fine: the same of a picture that has as many samples as the truth."""
 
     view: str
     drawn: str
@@ -77,6 +90,7 @@ class Row:
     ssim: float | None = None
     flip: float | None = None
     crops: float | None = None
+    fine: float | None = None
 
 
 def eyes(world: World) -> dict[str, Eye]:
@@ -167,12 +181,11 @@ def _with_surfels(one: Species, other: Species) -> Species:
 
 
 @contextmanager
-def loaded(world: World) -> Iterator[Forest]:
-    forest = Forest(world.species, world.placement, world.ground)
+def loaded(forest: Scenery) -> Iterator[None]:
     for _ in forest.load(context()):
         pass
     try:
-        yield forest
+        yield
     finally:
         forest.release()
 
@@ -200,59 +213,84 @@ def truths(cache: Path, world: World) -> dict[str, Picture]:
 def measured(cache: Path, say: Say) -> tuple[list[Row], dict[tuple[str, str], Picture]]:
     """Rows, and pictures by view and what is drawn; the truth among them, as "truth"."""
     there = worlds(cache)
-    look_at = truths(cache, there["whole"])
+    seen_by, look_at = eyes(there["whole"]), truths(cache, there["whole"])
     rows: list[Row] = []
     pictures = {(view, "truth"): picture for view, picture in look_at.items()}
-    for drawn, world in there.items():
-        with loaded(world) as forest:
-            for view, eye in eyes(world).items():
-                look = Look(detail=IN_FULL, level=0) if drawn == "whole" else Look()
-                say(f"{view}, {drawn}")
-                times = 1 if drawn == "whole" else FRAMES
-                for size in SIZES:
-                    row, picture = timed(forest, eye, size, look, times)
-                    row = replace(row, view=view, drawn=drawn)
-                    if size == SIZES[0]:
-                        row = compared(row, look_at[view], picture, crops_of(forest, eye, size))
-                        pictures[view, drawn] = picture
-                    rows.append(row)
+    parts: dict[str, list[Part]] = {}
+
+    def drawn(what: str, forest: Scenery, look: Look) -> None:
+        for view, eye in seen_by.items():
+            say(f"{view}, {what}")
+            for size in SIZES:
+                row = replace(timed(forest, eye, size, look), view=view, drawn=what)
+                if size == SIZES[0]:
+                    truth, picture = look_at[view], forest.picture(eye, size, look)
+                    row = compared(row, truth, picture, parts[view])
+                    if look.level is None:  # else it would be the truth
+                        finer = forest.picture(eye, size, look, SUPERSAMPLE, samples=0)
+                        row = replace(row, fine=alike(truth, finer, parts[view]))
+                    pictures[view, what] = picture
+                rows.append(row)
+
+    for what, world in there.items():
+        forest = Forest(world.species, world.placement, world.ground)
+        with loaded(forest):
+            parts = parts or {
+                view: crops_of(forest, eye, SIZES[0]) for view, eye in seen_by.items()
+            }
+            drawn(what, forest, Look(detail=IN_FULL, level=0) if what == "whole" else Look())
+    squares = tiled(cache, say)
+    with loaded(squares):
+        drawn("tiles", squares, Look())
     return rows, pictures
 
 
-def timed(
-    forest: Forest, eye: Eye, size: tuple[int, int], look: Look, times: int
-) -> tuple[Row, Picture]:
-    """Median time of so many frames, after one that is not counted where there are several."""
-    ctx = context()
+def tiled(cache: Path, say: Say) -> TileForest:
+    """The landscape as tiles of surfels, which are made where they were not before."""
+    out = cache / f"tiles_{key_of(KINDS, TREES, EXTENT_M)}"
+    if not (out / "tileset.json").exists():
+        words = "--surfels", "--tile", str(TILE_M)
+        made = tiles(scene(cache / "scene"), library(cache, SURFELS), out, PROCESSES, *words)
+        size = sum(file.stat().st_size for file in out.rglob("*") if file.is_file())
+        say(f"tiles: {made.seconds:.0f} s, {made.peak_mb:,} MB peak, {size / 1e6:.0f} MB")
+    place = read_tile_world(out / "tileset.json")
+    return TileForest(place.tileset, place.ground)
+
+
+def timed(forest: Scenery, eye: Eye, size: tuple[int, int], look: Look) -> Row:
+    """Median time of the processor, of all threads, of FRAMES frames after one that is not counted;
+    of a single one of trees that are whole, which takes minutes."""
+    ctx, once = context(), look.level is not None
     with framebuffer_kept(ctx), Screen(ctx) as screen:
         seconds = []
-        for number in range(times + (times > 1)):
-            since = perf_counter()
+        for _ in range(1 if once else FRAMES + 1):
+            since = process_time()
             screen.begin(size, (0.0, 0.0, 0.0))
             stats = forest.draw(eye, size, look)
             screen.resolve()
             screen.ctx.finish()
-            if number or times == 1:
-                seconds.append(perf_counter() - since)
-    picture = forest.picture(eye, size, look)
+            seconds.append(process_time() - since)
     surfels = int(stats.said[0].split()[0].replace(",", "")) if stats.said else 0
-    median = 1e3 * float(np.median(seconds))
-    return Row("", "", size[0], median, stats.draws, stats.triangles, surfels), picture
+    median = 1e3 * float(np.median(seconds if once else seconds[1:]))
+    return Row("", "", size[0], median, stats.draws, stats.triangles, surfels)
 
 
-def compared(
-    row: Row, truth: Picture, picture: Picture, crops: Sequence[tuple[slice, slice]]
-) -> Row:
+def compared(row: Row, truth: Picture, picture: Picture, parts: Sequence[Part]) -> Row:
+    """The row, and how far a picture is from the truth."""
     whole = score(reference(truth), picture)
-    one, other = luma(truth), luma(picture)
-    parts = [hierarchical(one[part], other[part]) for part in crops]
     return replace(
         row,
-        hierarchical=hierarchical(one, other),
+        hierarchical=hierarchical(luma(truth), luma(picture)),
         ssim=float(whole["ssim"]),
         flip=float(whole["flip"]),
-        crops=float(np.mean(parts)) if parts else None,
+        crops=alike(truth, picture, parts),
     )
+
+
+def alike(truth: Picture, picture: Picture, parts: Sequence[Part]) -> float:
+    """Mean hierarchical similarity of parts."""
+    one, other = luma(truth), luma(picture)
+    return float(np.mean([hierarchical(one[part], other[part]) for part in parts]))
 
 
 def luma(picture: Picture) -> SingleArray:
@@ -260,26 +298,30 @@ def luma(picture: Picture) -> SingleArray:
     return np.asarray(srgb_from_linear(over(picture)) @ LUMINANCE)
 
 
-def crops_of(forest: Forest, eye: Eye, size: tuple[int, int]) -> list[tuple[slice, slice]]:
-    """Parts of a picture that hold a tree each, of those that are large enough, spread evenly over
-    distances."""
+def crops_of(forest: Forest, eye: Eye, size: tuple[int, int]) -> list[Part]:
+    """Parts of a picture that hold a tree each, of those that are large enough and that nearer ones
+    leave in sight, spread evenly over distances."""
     found, _, _ = forest.choose(eye, size, Look(detail=IN_FULL, level=0))
-    kinds = forest._kinds_for(eye.focal_px(size[1]))
     kind, scale = found.rows["species"], found.rows["scale"]
+    low, high = np.stack([one.levels[0].bounds for one in forest.species], axis=1)
     middle = found.place.astype(np.float64)
-    middle[:, 1] += scale * kinds.center[kind]
+    middle[:, 1] += scale * (low + high)[kind, 1] / 2
+    wide = np.abs(np.stack([low, high]))[..., ::2].max(axis=(0, 2))[kind]
     right, up, back = (middle @ eye.axes.T).T
     focal, ahead = eye.focal_px(size[1]), back < 0
     depth = np.where(ahead, -back, 1.0)
-    half = scale * kinds.radius[kind] * focal / depth
-    x, y = size[0] / 2 + right * focal / depth, size[1] / 2 - up * focal / depth
-    inside = ahead & (x > half) & (x < size[0] - half) & (y > half) & (y < size[1] - half)
-    inside &= (2 * half >= CROP_PX[0]) & (2 * half <= CROP_PX[1])
-    rows = np.flatnonzero(inside)
-    rows = rows[np.argsort(depth[rows], kind="stable")]
-    rows = rows[np.unique(np.linspace(0, len(rows) - 1, CROPS).astype(int))] if len(rows) else rows
+    half = (scale * focal / depth)[:, None] * np.stack([(high - low)[kind, 1] / 2, wide], axis=1)
+    at = np.array(size[::-1]) / 2 + focal * np.stack([-up, right], axis=1) / depth[:, None]
+    inside = ((at > half) & (at < np.array(size[::-1]) - half)).all(axis=1)
+    inside &= (2 * half[:, 0] >= CROP_PX[0]) & (2 * half[:, 0] <= CROP_PX[1])
+    hidden, parts = np.zeros(size[::-1], bool), []
+    for row in np.flatnonzero(ahead)[np.argsort(depth[ahead], kind="stable")]:
+        part = _around(at[row, 0], half[row, 0]), _around(at[row, 1], half[row, 1])
+        if inside[row] and hidden[part].mean() <= HIDDEN:
+            parts.append(part)
+        hidden[part] = True
+    return [parts[i] for i in np.unique(np.linspace(0, len(parts) - 1, CROPS).astype(int))]
 
-    def around(middle: float, half: float) -> slice:
-        return slice(int(middle - half), ceil(middle + half))
 
-    return [(around(y[i], half[i]), around(x[i], half[i])) for i in rows]
+def _around(middle: float, half: float) -> slice:
+    return slice(max(int(middle - half), 0), max(ceil(middle + half), 0))

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from itertools import product
 from typing import Any
 
 import numpy as np
 
+from blue.landscape import LANDSCAPE_ASKED, Row
+from blue.landscape import SIZES as PICTURES
 from blue.orders import METHODS, SIZES, Order, Orders
 from blue.plate import Sides
 from blue.prefixes import EQUAL_PREFIXES, MODELS, PREFIXES, Scores
@@ -23,6 +26,14 @@ STRAWMAN = 3.0
 """Times the paper's, that our own making of its order takes at most."""
 ASKED = {10_000: (0.7, 1.1, 1.0), 50_000: (0.7, 1.1, 1.0), 100_000: (1.1, 1.0, 1.0)}
 """Of ours beside the paper's order: time at most, least and median distance at least."""
+
+LANDSCAPE_NAMES = {
+    "hierarchical": "hierarchical",
+    "ssim": "SSIM",
+    "flip": "FLIP",
+    "crops": "trees",
+    "fine": "trees, 16 samples",
+}
 
 
 def order_rows(found: Orders) -> Rows:
@@ -197,6 +208,41 @@ def plate_table(found: Sequence[Sides]) -> Rows:
             "largest hole, mm": f"{1e3 * np.median(one.hole_m):.1f}",
         }
         for one in found
+    ]
+
+
+def landscape_rows(found: Sequence[Row]) -> Rows:
+    return [asdict(one) for one in found]
+
+
+def landscape_table(found: Sequence[Row]) -> Rows:
+    """A row for each view and what is drawn of it: times at both sizes, the rest at the first."""
+    at = {(one.view, one.drawn, one.width): one for one in found}
+    rows = []
+    for one in found:
+        if one.width != PICTURES[0][0]:
+            continue
+        row: dict[str, Any] = {"view": one.view, "drawn": one.drawn}
+        for width, height in PICTURES:
+            seconds = at[one.view, one.drawn, width].milliseconds / 1e3
+            row[f"cpu seconds, {width} x {height}"] = f"{seconds:.1f}"
+        row |= {"draws": one.draws, "triangles": f"{one.triangles:,}"}
+        row |= {"surfels": f"{one.surfels:,}"}
+        for key in ("hierarchical", "ssim", "flip", "crops", "fine"):
+            value = getattr(one, key)
+            row[LANDSCAPE_NAMES[key]] = "" if value is None else f"{value:.3f}"
+        rows.append(row)
+    return rows
+
+
+def landscape_missed(found: Sequence[Row]) -> list[str]:
+    """Of surfels alone, and of trees at as many samples as what they are compared with."""
+    return [
+        f"{one.view}: {what} similarity is {value:.3f}, not {LANDSCAPE_ASKED[one.view]}"
+        for one in found
+        if one.drawn == "surfels"
+        for what, value in (("hierarchical", one.hierarchical), ("crops'", one.fine))
+        if value is not None and value < LANDSCAPE_ASKED[one.view]
     ]
 
 

@@ -44,12 +44,20 @@ class Made:
 
 
 def command(cache: Path, plants: int, processes: int, keep: bool = False) -> Made:
-    """`vegtool tiles` of a landscape, from nothing."""
+    """`vegtool tiles` of a landscape of the scenes, from nothing."""
     out = cache / f"tiles_{plants}"
+    made = tiles(scene(cache, plants), library(cache, print), out, processes)
+    if not keep:
+        shutil.rmtree(out)
+    return made
+
+
+def tiles(scene: Path, library: Path, out: Path, processes: int, *more: str) -> Made:
+    """`vegtool tiles` of a scene file, with further words, from nothing."""
     shutil.rmtree(out, ignore_errors=True)
     words = [
-        sys.executable, "-m", "vegtool", "tiles", str(scene(cache, plants)), "--species",
-        str(library(cache, print)), "-o", str(out), "-j", str(processes), "--json",
+        sys.executable, "-m", "vegtool", "tiles", str(scene), "--species", str(library),
+        "-o", str(out), "-j", str(processes), "--json", *more,
     ]  # fmt: skip
     started = perf_counter()
     process = subprocess.Popen(words, stdout=subprocess.PIPE)
@@ -64,8 +72,6 @@ def command(cache: Path, plants: int, processes: int, keep: bool = False) -> Mad
         raise SystemExit(process.returncode)
     wrong = check_tileset(out / "tileset.json")
     facts = json.loads(text)
-    if not keep:
-        shutil.rmtree(out)
     return Made(facts["plants"], processes, seconds, peak[0], facts, wrong)
 
 

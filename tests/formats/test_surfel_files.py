@@ -49,6 +49,24 @@ def test_what_is_written_is_read_again(
     assert found.unlit and not found.double_sided
 
 
+@pytest.mark.parametrize("quantized", [False, True])
+def test_light_is_read_again(tmp_path: Path, quantized: bool) -> None:
+    """To a byte. Where there is none, none is written; nor is there a default in its place."""
+    plain = ball(50)
+    shares = np.random.default_rng(0).integers(0, 256, (50, 3)) / 255
+    told = replace(plain, light=shares, transmission_tint=np.array([1.0, 0.5, 0.25]))
+    found = read_surfel_set(written(tmp_path, told, quantized))
+    assert found.light is not None
+    assert np.allclose(found.exposure, shares[:, :2], atol=1e-7)
+    assert np.allclose(found.transmission, shares[:, 2], atol=1e-7)
+    assert found.transmission_tint.tolist() == [1.0, 0.5, 0.25]
+    path = written(tmp_path, plain, quantized)
+    assert b"_LIGHT" not in path.read_bytes() and b"tint" not in path.read_bytes()
+    found = read_surfel_set(path)
+    assert found.light is None
+    assert (found.exposure == 1).all() and (found.transmission == 0).all()
+
+
 def test_far_from_the_origin_nothing_is_lost(tmp_path: Path) -> None:
     """Map coordinates: float32 alone would round them to half a metre."""
     told = ball(50, 0.5, (5e6, 100.0, -3e6))
@@ -58,9 +76,13 @@ def test_far_from_the_origin_nothing_is_lost(tmp_path: Path) -> None:
 
 
 def test_a_surfel_is_36_bytes_or_24(tmp_path: Path) -> None:
-    """Beside what a file of any length has."""
-    for quantized, bytes_ in ((False, 36), (True, 24)):
-        sizes = [written(tmp_path, ball(n), quantized).stat().st_size for n in (100, 300)]
+    """Beside what a file of any length has; 4 more with light."""
+    lit = {n: replace(ball(n), light=np.zeros((n, 3))) for n in (100, 300)}
+    plain = {n: ball(n) for n in (100, 300)}
+    for sets, quantized, bytes_ in (
+        (plain, False, 36), (plain, True, 24), (lit, False, 40), (lit, True, 28)
+    ):  # fmt: skip
+        sizes = [written(tmp_path, sets[n], quantized).stat().st_size for n in (100, 300)]
         assert abs(sizes[1] - sizes[0] - 200 * bytes_) < 50
 
 
@@ -89,6 +111,8 @@ def mesh_of(document: dict[str, Any]) -> dict[str, Any]:
         lambda d: mesh_of(d)["primitives"][0]["attributes"].pop("_SIZE"),
         lambda d: mesh_of(d)["primitives"][0]["attributes"].pop("NORMAL"),
         lambda d: mesh_of(d)["primitives"][0].update(material=7),
+        lambda d: mesh_of(d)["primitives"][0]["attributes"].update(_LIGHT=99),
+        lambda d: mesh_of(d)["primitives"][0]["attributes"].update(_LIGHT=0),
         lambda d: d["meshes"].append(mesh_of(d)) or d["nodes"].append({"mesh": 1})
         or d["scenes"][0]["nodes"].append(1),
         lambda d: d["accessors"][1].update(count=3),
@@ -119,3 +143,10 @@ def test_other_programs_read_the_ply() -> None:
     assert np.allclose(found.vertices, told.position, atol=1e-6)
     shown = np.round(255 * srgb_from_linear(told.color))
     assert np.abs(np.asarray(found.colors)[:, :3] - shown).max() == 0
+    lit: Any = trimesh.load(
+        BytesIO(ply_bytes(replace(told, light=np.tile([0.2, 0.4, 1.0], (40, 1))))), file_type="ply"
+    )
+    assert np.array_equal(lit.vertices, found.vertices)
+    rows = lit.metadata["_ply_raw"]["vertex"]["data"]
+    names = ("exposure", "exposure_behind", "transmission")
+    assert [rows[name].tolist() for name in names] == [[share] * 40 for share in (51, 102, 255)]

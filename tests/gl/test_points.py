@@ -7,12 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vegtool.arrays import unit
 from vegtool.gl.draw import Shot, pictured
-from vegtool.gl.points import SurfelSetBuffers
+from vegtool.gl.points import AS_IT_IS, SurfelSetBuffers
 from vegtool.lighting.light import Light
+from vegtool.lighting.shading import shaded
 from vegtool.lod import Display
 from vegtool.measure.views import framed
-from vegtool.surfel_set import Spacing, SurfelSet
+from vegtool.surfel_set import ALL_LIGHT, Spacing, SurfelSet
 
 pytestmark = pytest.mark.gl
 Z = np.array([0.0, 0, 1])
@@ -20,7 +22,7 @@ Z = np.array([0.0, 0, 1])
 
 def drawn(
     surfels: SurfelSet, radius: float, prefix: int, direction: np.ndarray = Z, turn: float = 0.0,
-    samples: int = 0,
+    samples: int = 0, light: Light | None = None,
 ) -> np.ndarray:  # fmt: skip
     """From ten metres away, a metre is 93.5 pixels."""
     camera = framed(np.zeros(3), 1.5, direction, 10.0, Display())
@@ -34,7 +36,9 @@ def drawn(
         )
         return pictured(
             buffers.ctx, shot,
-            lambda part: buffers.draw(rows, np.array([prefix]), part, Light(), footprint=finer),
+            lambda part: buffers.draw(
+                rows, np.array([prefix]), part, light or Light(), footprint=finer
+            ),
             finer, samples,
         )  # fmt: skip
 
@@ -121,3 +125,73 @@ def test_what_is_solid_is_mirrored_and_leaves_turn_round() -> None:
     )
     assert solid == pytest.approx(first, rel=0.01) and leaf == pytest.approx(second, rel=0.01)
     assert abs(first - second) > 0.1 * first
+
+
+DARK = Light(sky_above=0.0, sky_below=0.0)
+"""A sun alone."""
+SKY = Light(sun=0.0)
+AS_DRAWN = AS_IT_IS[0] / 127.5
+HALF = 1e-3
+"""Pictures are half floats."""
+
+
+def lit(surfels: SurfelSet, *light: float, tint: tuple[float, ...] = (1, 1, 1)) -> SurfelSet:
+    return replace(surfels, light=np.tile(light, (len(surfels), 1)), transmission_tint=tint)
+
+
+def test_all_the_light_there_is_draws_the_same_picture() -> None:
+    """To the bit, as none said; a set without has no more of it on the GPU than before."""
+    for surfels in (ONE, replace(ONE, double_sided=False)):
+        for way in (Z, np.array([0.6, 0, -0.8])):
+            said = drawn(lit(surfels, *ALL_LIGHT), 0.2, 2, way)
+            assert np.array_equal(said, drawn(surfels, 0.2, 2, way))
+    sizes = []
+    for surfels in (ONE, lit(ONE, *ALL_LIGHT)):
+        with SurfelSetBuffers(surfels) as buffers:
+            sizes.append(buffers._vertices.size // len(surfels))
+    assert sizes == [40, 44]
+
+
+def test_the_sky_lights_the_side_that_is_seen_as_far_as_it_reaches_it() -> None:
+    """From behind it is the other side's light; something solid has but one. Where none reaches it,
+    it is black under the sky, though not under the sun."""
+    half = lit(ONE, 0.4, 0.0, 0.0)
+    whole = drawn(ONE, 0.2, 1, light=SKY)[..., :3].max()
+    assert drawn(half, 0.2, 1, light=SKY)[..., :3].max() == pytest.approx(0.4 * whole, rel=HALF)
+    assert drawn(half, 0.2, 1, -Z, light=SKY)[..., :3].max() == 0
+    solid = drawn(replace(half, double_sided=False), 0.2, 1, -Z, light=SKY)[..., :3].max()
+    assert solid == pytest.approx(0.4 * whole, rel=HALF)
+    none = lit(ONE, 0.0, 0.0, 0.0)
+    assert drawn(none, 0.2, 1, light=SKY)[..., :3].max() == 0
+    toward = Light(Z, sky_above=0.0, sky_below=0.0)
+    assert drawn(none, 0.2, 1, light=toward)[..., :3].max() == pytest.approx(
+        AS_DRAWN * toward.sun, rel=HALF
+    )
+
+
+def test_what_lets_all_light_through_has_that_of_its_other_side() -> None:
+    """With the sun behind it, in its own colour times the tint; with the sun before it, none."""
+    tint = (1.0, 0.5, 0.2)
+    leaf = lit(replace(ONE, color=np.full((2, 3), 0.5)), 1.0, 1.0, 1.0, tint=tint)
+    behind = Light(-Z, sky_above=0.0, sky_below=0.0)
+    shown = drawn(leaf, 0.2, 1, light=behind)[..., :3].max(axis=(0, 1))
+    assert shown == pytest.approx(AS_DRAWN * behind.sun * 0.5 * np.array(tint), rel=HALF)
+    assert drawn(leaf, 0.2, 1, -Z, light=behind)[..., :3].max() == 0
+
+
+def test_light_is_that_of_the_reference() -> None:
+    """Of discs that look in all directions, from before and behind: what lighting/shading.py says
+    of their normals turned to the eye, with exposures that change sides with them."""
+    rng = np.random.default_rng(0)
+    sides = unit(rng.normal(size=(8, 3)) + 0.5 * np.array([Z, -Z] * 4))
+    for normal, shares in zip(sides, rng.integers(0, 256, (8, 3)), strict=True):
+        surfels = lit(of(((0, 0, 0), normal), ((1, 0, 0), normal)), *(shares / 255), tint=(1, 1, 0))
+        turned, (here, there, passing) = normal, shares / 255
+        if normal[2] < 0:
+            turned, here, there = -normal, there, here
+        expected = shaded(
+            np.ones((1, 3)), turned[None], DARK if normal[0] > 0 else Light(),
+            np.array([[here, there]]), passing, (1, 1, 0), 1.0, there,
+        )  # fmt: skip
+        shown = drawn(surfels, 0.2, 1, light=DARK if normal[0] > 0 else Light())
+        assert shown[..., :3].max(axis=(0, 1)) == pytest.approx(AS_DRAWN * expected[0], rel=HALF)

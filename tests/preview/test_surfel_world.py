@@ -176,7 +176,7 @@ def test_the_command_writes_pictures_and_figures(
     [
         (["--scene", "s.toml"], 2, "is surfel billboards, which stand where they do; leave out"),
         (["--up", "z"], 2, "leave out --scene, --unit, --up and --leaf-material"),
-        (["--fade", "dither"], 2, "--fade: surfel billboards follow each other at once"),
+        (["--fade", "dither"], 2, "--fade: surfel billboards follow each other in their own way"),
         (["--html", "p.html"], 2, "--html: writes a page of converted plants, whose levels are"),
     ],
 )

@@ -660,7 +660,7 @@ def test_nothing_among_the_tiles_is_overwritten(
     [
         (["--scene", "scene.toml"], "is a tileset, whose plants stand where they do"),
         (["--up", "z"], "is a tileset, whose plants stand where they do"),
-        (["--fade", "none"], "--fade: tiles follow each other at once"),
+        (["--fade", "none"], "--fade: tiles follow each other in their own way"),
         (["--html", "page.html"], "--html: writes a page of converted plants"),
     ],
 )

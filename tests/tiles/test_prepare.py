@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from library_cases import TRIANGLES, edit, model, write
 from plants import plant_of
+from surfel_sets import ball
 from tile_cases import all_of, scene_of
 
 from vegtool.convert import ConvertOptions
@@ -328,6 +329,21 @@ def test_levels_go_on_where_they_end(tmp_path: Path, plants: Path, converter: Co
     assert len(converter.asked) == 1
     after = {k: v for k, v in contents(plants).items() if not k.startswith(CACHE)}
     assert after == before
+
+
+def test_surfels_follow_the_levels_that_are_made(
+    tmp_path: Path, plants: Path, converter: Converter
+) -> None:
+    """Of an original and surfels from 12 m on: levels of triangles reach farther."""
+    converter.triangles = (39, 20, 6)
+    surfels = Level("surfels", surfels=ball(50), near_distance_m=12.0)
+    original = Level("mesh", mesh=plant_of(MANY[:100]))
+    options = {"levels": 2, "seed": 7, "measure": "off", "views": "ground", "unit": "cm"}
+    write_chain(LodChain("oak", (original, surfels), Display(50.0, 900), 7, options), plants)
+    (oak,) = landscape(tmp_path, ["oak"]).species
+    assert oak.triangles.tolist() == [100, 39, 20, 6]
+    assert oak.surfels is not None and oak.surfels.switch_m > oak.switch_m[-1]
+    assert len(oak.surfels.read()) == 50
 
 
 @pytest.mark.parametrize("counts", [(100, FEW), (FEW,), (100, 60, 3)])

@@ -281,6 +281,41 @@ def test_own_surfels_of_a_species_are_taken(made: tuple[World, dict[str, Entry]]
     assert np.allclose(moved, [1.0, 0.0, 0.0])
 
 
+def test_squares_keep_the_light_of_their_plants(tmp_path: Path) -> None:
+    """Half of all passes through its leaves, with a tint: so it is on every square, as files tell
+    it. How much of the sky's light reaches them, files of plants do not."""
+    tint = np.array([1.0, 0.8, 0.4])
+    leaves = tuple(replace(m, transmission=0.5, transmission_tint=tint) for m in BUSH.materials)
+    at = world(tmp_path, bushes(), bush=replace(BUSH, materials=leaves))
+    found = written(at)
+    for height in (1, 2):
+        nodes = of_kind(at.pyramid, found, height)
+        assert nodes
+        for node in nodes:
+            square = read_surfel_set(at.out / file_of(node))
+            assert square.light is not None
+            assert np.abs(square.light - [1.0, 1.0, 0.5]).max() < 0.01
+            assert np.allclose(square.transmission_tint, tint, atol=0.01)
+
+
+def test_light_is_sampled_and_averaged_as_colours_are(
+    made: tuple[World, dict[str, Entry]], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Where a species' own surfels have their colours as light too, so has the square."""
+    at, _ = made
+    node = of_kind(at.pyramid, made[1], 1)[0]
+    sample = at.pyramid.samples[0].read()
+    colors = np.random.default_rng(0).random(sample.color.shape)
+    monkeypatch.setattr(Shared, "sample", lambda *_: replace(sample, color=colors, light=colors))
+    stand = at.pyramid.stand(node)
+    path = tmp_path / "one.glb"
+    path.write_bytes(plants_tile(at.pyramid, at.shared, node, stand, len(stand)).data)
+    square = read_surfel_set(path)
+    assert len(stand) == 1 and square.color.std() > 0.1
+    own = square.color / stand.tint[0]
+    assert square.light is not None and np.abs(square.light - own).max() < 0.6 / 255
+
+
 def test_by_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """What it would be, then all, then one square alone; quantised as merged ones are."""
     kept, out = library(tmp_path, bush=BUSH), str(tmp_path / "tiles")

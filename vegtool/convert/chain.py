@@ -115,7 +115,7 @@ def convert(
             from vegtool.refine.reach import coverage_notes
 
             notes = (*notes, *coverage_notes(kept, truth_at))
-    notes = (*notes, *light_notes(plant, sun, options.method))
+    notes = (*notes, *light_notes(plant, sun))
     misses, beside = (*budget_notes(kept, options), *make.misses), make.beside()
     if SUFFIX in beside and (sun is not None or plant.exposure is not None):
         notes = (*notes, f"light that is baked is in the levels, not in {plant.name}{SUFFIX}")
@@ -154,15 +154,11 @@ def budget_notes(levels: Sequence[Level], options: ConvertOptions) -> tuple[str,
     return tuple(over)
 
 
-def light_notes(plant: Plant, sun: Sun | None, method: str = "") -> tuple[str, ...]:
+def light_notes(plant: Plant, sun: Sun | None) -> tuple[str, ...]:
     """Sentences on light that is not what it may seem."""
     notes = []
     if sun is not None and sun.elevation_deg < 0:
         notes.append("the sun is below the horizon: the levels' colours have the sky's light alone")
-    if method == SURFELS and (
-        plant.exposure is not None or any(m.transmission > 0 for m in plant.materials)
-    ):
-        notes.append("surfels have colours and normals alone: no exposure, no light through leaves")
     unlit = [material.name for material in plant.materials if material.unlit]
     if 0 < len(unlit) < len(plant.materials):
         notes.append(f"unlit beside others that are lit: levels light it too: {', '.join(unlit)}")

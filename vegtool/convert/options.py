@@ -49,8 +49,8 @@ OF_METHODS = {
 }
 """Methods beside refinement, and options of theirs alone."""
 
-OF_PICTURES = ("billboards", "pixels", "max_texture", "prelit", "occlusion", "translucency")
-"""Options that say nothing of surfels, which have colours and normals alone."""
+OF_PICTURES = ("billboards", "pixels", "max_texture")
+"""Options that say nothing of surfels."""
 FEWEST_POINTS, MOST_POINTS = 1_000, 200_000
 """Surfels of a level for which the user says no number."""
 
@@ -154,7 +154,7 @@ class ConvertOptions:
     occlusion: float | None = option(
         None,
         "How much less of the sky's light reaches what the plant itself hides from it: 1 is all of "
-        "it, 0 none; written as occlusion textures [0; with --prelit, 1].",
+        "it, 0 none; written as occlusion textures, or with each surfel [0; with --prelit, 1].",
         least=0.0,
         most=1.0,
     )
@@ -191,7 +191,8 @@ class ConvertOptions:
     )
     quantized: bool = option(
         False,
-        "Surfels as 24 bytes each, not 36, for clients that know KHR_mesh_quantization.",
+        "Surfels as 24 bytes each, not 36 (4 more with light of their own), for clients that know "
+        "KHR_mesh_quantization.",
     )
     max_texture: int = option(
         BakeOptions().max_texture, "Largest side of an atlas, in texels.", least=16, most=16384

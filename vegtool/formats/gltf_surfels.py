@@ -3,7 +3,8 @@
 Sources: glTF 2.0 specification, 3.7.2 (points); KHR_mesh_quantization (extension, Khronos glTF
 repository). What the length of that part follows from, and what it cannot know otherwise, is in the
 mesh's extras, as `surfels`: p_m and r_m of Brandt et al. 2019, section 4.1. How large the disc of
-each is, of the radius of all, is in the attribute _SIZE (SurfelSet.size).
+each is, of the radius of all, is in the attribute _SIZE (SurfelSet.size). Where surfels have light
+of their own, it is in the attribute _LIGHT, and in the extras the tint of what passes through.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ POINTS = 0
 STEPS = 65535
 """Of 16 bits."""
 EXTRAS = "surfels"
+LIGHT = "_LIGHT"
 _AGAIN = "Convert the plant again."
 
 
@@ -37,7 +39,7 @@ def add_surfels(
     """Add surfels to a document, positions relative to an origin (3,); return their node.
 
     quantized: positions in 16 bits and normals in 8, for clients that know KHR_mesh_quantization:
-    24 bytes each in place of 36.
+    24 bytes each in place of 36. Light takes 4 more.
     """
     placed: dict[str, Any] = {}
     local = surfels.position - origin
@@ -64,7 +66,7 @@ def add_surfels(
     if surfels.unlit:
         document.use_extension(UNLIT)
         material["extensions"] = {UNLIT: {}}
-    primitive = {
+    primitive: dict[str, Any] = {
         "mode": POINTS,
         "attributes": {
             "POSITION": position,
@@ -74,10 +76,14 @@ def add_surfels(
         },
         "material": document.add("materials", **material, doubleSided=surfels.double_sided),
     }
-    told = {
+    told: dict[str, Any] = {
         "p_m": surfels.spacing.length,
         "r_m": surfels.spacing.radius_m,
     }
+    if surfels.light is not None:
+        shares = np.round(surfels.light * 255).astype(np.uint8)
+        primitive["attributes"][LIGHT] = document.add_accessor(shares, normalized=True)
+        told["transmission_tint"] = surfels.transmission_tint.tolist()
     mesh = document.add("meshes", name=name, primitives=[primitive], extras={EXTRAS: told})
     return document.add("nodes", name=name, mesh=mesh, **placed)
 
@@ -103,9 +109,10 @@ def _read(file: GltfFile) -> SurfelSet:
             f"{len(meshes)} meshes without. {_AGAIN}"
         )
     (primitive,), told = meshes[0]["primitives"], meshes[0]["extras"][EXTRAS]
+    lit = LIGHT in primitive["attributes"]
     values = {
         name: np.asarray(file.accessor(primitive["attributes"][name]), np.float64)
-        for name in ("POSITION", "NORMAL", "COLOR_0", "_SIZE")
+        for name in ("POSITION", "NORMAL", "COLOR_0", "_SIZE", *([LIGHT] if lit else []))
     }
     if not all(usable_rows(rows).all() for rows in values.values()) or not len(values["POSITION"]):
         raise file.broken("numbers for each surfel", "NaN, infinite ones or none")
@@ -122,4 +129,6 @@ def _read(file: GltfFile) -> SurfelSet:
         values["_SIZE"][:, 0],
         UNLIT in material.get("extensions", {}),
         bool(material.get("doubleSided", False)),
+        values[LIGHT] if lit else None,
+        np.array(told["transmission_tint"] if lit else [1, 1, 1], np.float64),
     )

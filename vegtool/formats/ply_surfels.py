@@ -10,17 +10,19 @@ import numpy as np
 from vegtool.srgb import srgb_from_linear
 from vegtool.surfel_set import SurfelSet
 
-ROW = np.dtype(
-    [(name, "<f4") for name in ("x", "y", "z", "nx", "ny", "nz", "size")]
-    + [(name, "u1") for name in ("red", "green", "blue")]
-)
-TYPES = {"<f4": "float", "|u1": "uchar"}
+ROW = [(name, "<f4") for name in ("x", "y", "z", "nx", "ny", "nz", "size")] + [
+    (name, "u1") for name in ("red", "green", "blue")
+]
+LIGHT = [(name, "u1") for name in ("exposure", "exposure_behind", "transmission")]
+"""Further columns, of surfels with light of their own: 255 for 1."""
+TYPES = {"<f4": "float", "u1": "uchar"}
 
 
 def ply_bytes(surfels: SurfelSet) -> bytes:
     """A binary file, little endian: positions in metres, y up; normals; sizes of the
-    discs, of the radius of all; colours in sRGB."""
-    rows = np.empty(len(surfels), ROW)
+    discs, of the radius of all; colours in sRGB; light, where they have some of their own."""
+    columns = ROW if surfels.light is None else ROW + LIGHT
+    rows = np.empty(len(surfels), columns)
     color = np.round(255 * srgb_from_linear(np.clip(surfels.color, 0.0, 1.0))).astype(np.uint8)
     for names, values in (
         (("x", "y", "z"), surfels.position),
@@ -30,6 +32,9 @@ def ply_bytes(surfels: SurfelSet) -> bytes:
         for name, column in zip(names, values.T, strict=True):
             rows[name] = column
     rows["size"] = surfels.size
+    if surfels.light is not None:
+        for (name, _), column in zip(LIGHT, np.round(255 * surfels.light).T, strict=True):
+            rows[name] = column
     head = [
         "ply",
         "format binary_little_endian 1.0",
@@ -37,7 +42,7 @@ def ply_bytes(surfels: SurfelSet) -> bytes:
         f"comment p_m {surfels.spacing.length}",
         f"comment r_m {surfels.spacing.radius_m:.9g}",
         f"element vertex {len(rows)}",
-        *(f"property {TYPES[ROW[name].str]} {name}" for name in ROW.names or ()),
+        *(f"property {TYPES[kind]} {name}" for name, kind in columns),
         "end_header\n",
     ]
     return "\n".join(head).encode() + rows.tobytes()

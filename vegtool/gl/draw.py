@@ -101,7 +101,10 @@ def drawn_part(
     ctx: moderngl.Context, part: Shot, render: Callable[[Shot], None], supersample: int,
     samples: int,
 ) -> Target:  # fmt: skip
-    """What is rendered of a picture that a target can hold; as of `draw_tile`."""
+    """What is rendered of a picture that a target can hold; as of `draw_tile`. Raises ValueError
+    where both kinds of samples are asked for, which are never averaged together."""
+    if samples and supersample > 1:
+        raise ValueError(f"expected supersample 1 beside multisampling, found {supersample}")
     size = supersample * part.width, supersample * part.height
     drawn = drawing_target(ctx, size, samples)
     begin(drawn, size)

@@ -204,14 +204,14 @@ class Landscape(OnGpu):
                 )
                 for one in frame.points
             ]
-            draws += len(drawn)
+            draws += sum(calls for calls, _ in drawn)
             if ground and self._ground is not None:  # last: most of it is hidden
                 self.ctx.disable(moderngl.CULL_FACE)
                 triangles += self._ground.draw(shot, light, view)
                 draws += 1
         self.ctx.wireframe = False
         self.ctx.enable_only(moderngl.DEPTH_TEST)
-        return Drawn(draws, triangles, self._samples.samples, sum(drawn))
+        return Drawn(draws, triangles, self._samples.samples, sum(sent for _, sent in drawn))
 
     def _draw_plants(self, frame: Frame, shot: Shot, light: Light, view: View) -> tuple[int, int]:
         self._noise.use(NOISE)

@@ -25,8 +25,15 @@ sine of the turn about y, radius of the discs in that unit, factor of the width.
 linear factors of 0 to 2."""
 AS_IT_IS = (127, 127, 127, 255)
 """A tint, nearly."""
-PER_SURFEL = (("in_position", 3), ("in_normal", 3), ("in_color", 3), ("in_size", 1))
-"""Attributes: name and floats."""
+GROUPS_PER_DOUBLING = 4
+"""Of prefix lengths, drawn together: none is drawn longer than by a fifth."""
+PER_SURFEL = (
+    ("in_position", "3f", "f4", 3), ("in_normal", "3f", "f4", 3), ("in_color", "3f", "f4", 3),
+    ("in_size", "1f", "f4", 1),
+)  # fmt: skip
+"""Attributes: name, format, and how that is stored: type and number."""
+LIGHT = (("in_light", "4f1", "u1", 4),)
+"""What surfels with light of their own have further; the last byte is 0."""
 PER_INSTANCE = (("in_place", "4f", 0), ("in_turn_size", "4f", 16), ("in_tint", "4f1", 32))
 """Attributes: name, format and offset."""
 
@@ -41,8 +48,14 @@ class SurfelSetBuffers(OnGpu):
         self.center = (low + high) / 2
         self.unit = float(np.linalg.norm(high - low) / 2) or 1.0
         local = (surfels.position - self.center) / self.unit
-        rows = np.column_stack([local, surfels.normal, surfels.color, surfels.size])
-        self._vertices = self.ctx.buffer(rows.astype(np.float32).tobytes())
+        columns = [local, surfels.normal, surfels.color, surfels.size[:, None]]
+        if surfels.light is not None:
+            columns.append(np.pad(np.rint(255 * surfels.light), ((0, 0), (0, 1))))
+        self._attributes = PER_SURFEL + (() if surfels.light is None else LIGHT)
+        rows = np.empty(len(surfels), [(name, kind, (n,)) for name, _, kind, n in self._attributes])
+        for (name, *_), column in zip(self._attributes, columns, strict=True):
+            rows[name] = column
+        self._vertices = self.ctx.buffer(rows)
         self._rows = self.ctx.buffer(reserve=POINT_INSTANCE.itemsize, dynamic=True)
         self._arrays: dict[moderngl.Program, moderngl.VertexArray] = {}
         self._pace = Pace(self.ctx)
@@ -95,15 +108,16 @@ class SurfelSetBuffers(OnGpu):
     def draw(
         self, rows: np.ndarray, prefix: IntArray, shot: Shot, light: Light, view: View = "lit",
         footprint: float = 1.0,
-    ) -> int:  # fmt: skip
+    ) -> tuple[int, int]:  # fmt: skip
         """Draw the first `prefix` (n,) surfels at each of n places into the framebuffer in use,
-        which has depth; returns how many in all.
+        which has depth; returns draw calls, and how many surfels in all.
 
         shot: its target is the eye. footprint: samples per pixel and axis. Places whose prefixes
-        are alike to a power of two are one call, and have as many as the longest.
+        are alike (GROUPS_PER_DOUBLING) are one call, and have as many as the longest.
         """
         defines = {
             "UNLIT": self.surfels.unlit, "DOUBLE_SIDED": self.surfels.double_sided,
+            "LIGHT": self.surfels.light is not None,
             "PAINTED": view == "painted",
             "SOFT_EDGES": self.ctx.fbo.samples > 0,
             f"OVERDRAW {OVERDRAW_STEP}": view == "overdraw",
@@ -119,6 +133,7 @@ class SurfelSetBuffers(OnGpu):
             ("right", tuple(pixel[0])),
             ("up", tuple(pixel[1])),
             ("size", size),
+            ("transmission_tint", tuple(self.surfels.transmission_tint)),
         ):
             if name in shader:
                 shader[name] = value
@@ -128,8 +143,10 @@ class SurfelSetBuffers(OnGpu):
         count = np.minimum(prefix[order], len(self.surfels.position))
         self._rows = rewritten(self._rows, rows[order])
         self.ctx.enable(moderngl.PROGRAM_POINT_SIZE)
-        starts = np.flatnonzero(np.diff(np.ceil(np.log2(count)), prepend=np.inf))
-        sent = 0
+        starts = np.flatnonzero(
+            np.diff(np.ceil(GROUPS_PER_DOUBLING * np.log2(count)), prepend=np.inf)
+        )
+        calls = sent = 0
         for first, end in zip(starts, np.append(starts[1:], len(count)), strict=False):
             most = int(count[first])
             at_once = max(self._pace.most // most, 1)
@@ -138,20 +155,17 @@ class SurfelSetBuffers(OnGpu):
                 array = self._array(shader, row)
                 array.render(moderngl.POINTS, vertices=most, instances=part)
                 self._pace.sent(most * part)
+                calls += 1
                 sent += most * part
         self.ctx.disable(moderngl.PROGRAM_POINT_SIZE)
-        return sent
+        return calls, sent
 
     def _array(self, shader: moderngl.Program, first: int) -> moderngl.VertexArray:
         if shader not in self._arrays:
             layout, names = [], []
-            for name, many in (
-                ("in_position", 3),
-                ("in_normal", 3),
-                ("in_color", 3),
-                ("in_size", 1),
-            ):
-                layout.append(f"{many}f" if name in shader else f"{4 * many}x")
+            for name, form, kind, count in self._attributes:
+                unused = f"{count * np.dtype(kind).itemsize}x"
+                layout.append(form if name in shader else unused)
                 names += [name] if name in shader else []
             content = [(self._vertices, " ".join(layout), *names)]
             self._arrays[shader] = self.ctx.vertex_array(shader, content)

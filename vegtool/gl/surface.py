@@ -17,8 +17,10 @@ from vegtool.gl.draw import (
     placed,
     render_group,
     set_footprint,
+    set_light,
     shader_of,
 )
+from vegtool.gl.pictures import BakedLight
 from vegtool.gl.upload import PlantBuffers
 
 
@@ -67,16 +69,20 @@ def surface(
     anisotropy: int = ANISOTROPY,
     footprint: float = 1.0,
     places: bool = True,
+    lit: BakedLight | None = None,
 ) -> Seen:
     """What each sample of a picture shows; `supersample` of them per pixel and axis.
 
     footprint: mip-mapped textures are filtered as for pixels so many times as wide. places: whether
-    positions are wanted. Drawn in one piece. Raises CapabilityError where OpenGL cannot hold that.
+    positions are wanted. lit: light that goes into colours, 1 at most, with its shadows; without
+    any, as of plants that are unlit, colours stay. Drawn in one piece. Raises CapabilityError where
+    OpenGL cannot hold that.
     """
     ctx = buffers.ctx
     size = supersample * shot.width, supersample * shot.height
     samples_per_metre = supersample * pixels_per_metre(shot)
     frame = _target(ctx, size)
+    shadows = None if lit is None else lit.shadows
     passing = any(m.transmission > 0 for m in buffers.plant.materials)
     with framebuffer_kept(ctx):
         frame.viewport = (0, 0, *size)
@@ -84,10 +90,12 @@ def surface(
         frame.clear(viewport=(0, 0, *size))
         ctx.enable_only(moderngl.DEPTH_TEST)
         for group in buffers.groups:
-            shader = shader_of(buffers, group, "surface.frag", anisotropy)
+            shader = shader_of(buffers, group, "surface.frag", anisotropy, shadows)
             shader["view_projection"] = placed(buffers, shot)
             shader["first_face"] = group.first
             set_footprint(shader, supersample * footprint)
+            if lit is not None:
+                set_light(shader, buffers, lit.light, shadows)
             buffers.use(group, shader, point_sampled=buffers.minified(group, samples_per_metre))
             render_group(buffers, group, shader)
         ctx.disable(moderngl.CULL_FACE)

@@ -175,7 +175,7 @@ def _check_alone(
             "--unit, --up and --leaf-material"
         )
     if options.fade != PreviewOptions().fade:
-        raise UsageError(f"--fade: {they} follow each other at once; leave it out")
+        raise UsageError(f"--fade: {they} follow each other in their own way; leave it out")
 
 
 def _is_surfels(path: Path) -> bool:

@@ -101,17 +101,23 @@ def make(work: Work, progress: Progress = silent) -> tuple[str, ...]:
 
 def joined(manifests: Sequence[Path]) -> Species:
     """A plant whose levels are told by several manifests, each going on from where the one before
-    ends: what is first in it is not drawn. Levels are read when they are asked for.
+    ends: what is first in it is not drawn. Surfels follow all of them. Levels are read when they
+    are asked for.
 
     Raises InputError for what is missing or broken.
     """
     first, *others = map(stored_species, manifests)
     for more in others:
         files = (*first.files, *more.files[1:])
+        switch, surfels = np.concatenate([first.switch_m, more.switch_m[1:]]), first.surfels
+        if surfels is not None:
+            beyond = max(surfels.switch_m, float(np.nextafter(switch[-1], np.inf)))
+            surfels = replace(surfels, switch_m=beyond)
         first = replace(
             first,
             levels=Stored(files),
-            switch_m=np.concatenate([first.switch_m, more.switch_m[1:]]),
+            surfels=surfels,
+            switch_m=switch,
             fade=np.concatenate([first.fade, more.fade[1:]]),
             files=files,
             error_m=np.concatenate([first.error_m, more.error_m[1:]]),

@@ -179,6 +179,8 @@ def _placed(
         surfels.color[row] * stand.tint[which][of],
         (scale * radius)[of] * surfels.size[row],
         surfels.size[row],
+        None if surfels.light is None else surfels.light[row],
+        surfels.transmission_tint,
     )
     return discs, of
 

@@ -6,6 +6,10 @@ in vec3 in_position;   // in the plant's frame and unit, from its center
 in vec3 in_normal;
 in vec3 in_color;      // linear
 in float in_size;      // of the radius of the discs
+#ifdef LIGHT
+in vec4 in_light;      // exposure of the normal's side and the other, share that passes through
+uniform vec3 transmission_tint;
+#endif
 in vec4 in_place;      // metres from the eye to the plant's center; metres of a unit
 in vec4 in_turn_size;  // cosine and sine of its turn about y; radius of the discs, in its unit; width
 in vec4 in_tint;       // 0 to 255
@@ -46,12 +50,18 @@ void main() {
 #ifdef UNLIT
     light = color;
 #else
-#ifdef DOUBLE_SIDED
-    own = normal;
+#ifdef LIGHT
+    Surface s = Surface(color, own, in_light.xy, in_light.z, transmission_tint);
 #else
-    own = mirrored_to(own, to_eye);
+    Surface s = Surface(color, own, vec2(1.0), 0.0, vec3(1.0));
 #endif
-    light = shaded(Surface(color, own, vec2(1.0), 0.0, vec3(1.0)), 1.0, 1.0);
+#ifdef DOUBLE_SIDED
+    if (dot(own, to_eye) < 0.0) s.exposure = s.exposure.yx;
+    s.normal = normal;
+#else
+    s.normal = mirrored_to(own, to_eye);
+#endif
+    light = shaded(s, 1.0, s.exposure.y);  // as in lit.glsl, without shadows
 #endif
     gl_Position = view_projection * vec4(center, 1.0);
     float away = gl_Position.w;

@@ -15,7 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from vegtool.arrays import FloatArray, IntArray, checked
+from vegtool.baking.bake import has_light
 from vegtool.gl.draw import Shot
+from vegtool.gl.pictures import BakedLight
 from vegtool.gl.surface import surface
 from vegtool.gl.upload import PlantBuffers
 from vegtool.measure.views import upright, views
@@ -55,13 +57,15 @@ Bools = npt.NDArray[np.bool_]
 class Candidates:
     """n places of a surface. position: (n, 3) metres. normal: (n, 3) unit, to the side that is
     seen. color: (n, 3) linear. material: (n,) int32 of the plant. pixel_m: metres between them,
-    about, as seen from where they were."""
+    about, as seen from where they were. light: (n, 3) as of SurfelSet, of the side that is seen and
+    the other, and what passes through; or None where there is no more than colours say."""
 
     position: FloatArray
     normal: FloatArray
     color: FloatArray
     material: IntArray
     pixel_m: float
+    light: FloatArray | None = None
 
     def __post_init__(self) -> None:
         position = checked("Candidates.position", self.position, (None, 3), np.float64)
@@ -72,6 +76,9 @@ class Candidates:
         material = checked("Candidates.material", self.material, (count,), np.int32)
         object.__setattr__(self, "position", position)
         object.__setattr__(self, "material", material)
+        if self.light is not None:
+            light = checked("Candidates.light", self.light, (count, 3), np.float64)
+            object.__setattr__(self, "light", light)
 
     def __len__(self) -> int:
         return len(self.position)
@@ -80,28 +87,32 @@ class Candidates:
         """Some of them."""
         return Candidates(
             self.position[rows], self.normal[rows], self.color[rows], self.material[rows],
-            self.pixel_m,
+            self.pixel_m, None if self.light is None else self.light[rows],
         )  # fmt: skip
 
 
 def candidates(
-    buffers: PlantBuffers, resolution: int = RESOLUTION, progress: Progress = silent
+    buffers: PlantBuffers,
+    resolution: int = RESOLUTION,
+    progress: Progress = silent,
+    lit: BakedLight | None = None,
 ) -> Candidates:
     """All that is seen of a plant from outside.
 
-    buffers: without mipmaps. Of what hides everything else, that alone is found; of a surface that
-    is seen from no side, nothing. Raises CapabilityError where nothing can draw.
+    buffers: without mipmaps. lit: light that goes into their colours. Of what hides everything
+    else, that alone is found; of a surface that is seen from no side, nothing. Raises
+    CapabilityError where nothing can draw.
     """
     plant = buffers.plant
     corners = corner_directions(plant)
-    found = [seen_from(buffers, direction, resolution) for direction in corners]
+    found = [seen_from(buffers, direction, resolution, lit) for direction in corners]
     covered = Covered(plant.center, found[0].pixel_m)
     for one in found:
         covered.add(one)
     idle = 0
     for number, view in enumerate(views("all", FURTHER)):
         progress("candidates", number / FURTHER)
-        one = seen_from(buffers, view.direction, resolution)
+        one = seen_from(buffers, view.direction, resolution, lit)
         new = ~covered.covers(one)
         idle = 0 if new.sum() > WORTH * len(one) else idle + 1
         if not idle:
@@ -113,16 +124,20 @@ def candidates(
 
 
 def enough(
-    buffers: PlantBuffers, count: int, resolution: int = RESOLUTION, progress: Progress = silent
+    buffers: PlantBuffers,
+    count: int,
+    resolution: int = RESOLUTION,
+    progress: Progress = silent,
+    lit: BakedLight | None = None,
 ) -> Candidates:
     """The same for `count` surfels: of finer pictures than of `resolution`, up to FINEST, where
     these have too few, as of what is thin or long."""
-    found = candidates(buffers, resolution, progress)
+    found = candidates(buffers, resolution, progress, lit)
     wanted = PER_SURFEL * count
     if not 0 < len(found) < wanted:
         return found
     finer = min(int(resolution * (wanted / len(found)) ** 0.5), FINEST)
-    return found if finer <= resolution else candidates(buffers, finer, progress)
+    return found if finer <= resolution else candidates(buffers, finer, progress, lit)
 
 
 def missed(buffers: PlantBuffers, those: Candidates, resolution: int = RESOLUTION) -> float:
@@ -145,7 +160,9 @@ def corner_directions(plant: Plant) -> FloatArray:
     return np.asarray(signs * half / np.linalg.norm(half))
 
 
-def seen_from(buffers: PlantBuffers, direction: FloatArray, resolution: int) -> Candidates:
+def seen_from(
+    buffers: PlantBuffers, direction: FloatArray, resolution: int, lit: BakedLight | None = None
+) -> Candidates:
     """What an orthographic picture shows, from a direction (3,), unit. Its pixels are as large in
     all directions: as many as `resolution` along the diagonal of the bounds."""
     plant = buffers.plant
@@ -154,21 +171,29 @@ def seen_from(buffers: PlantBuffers, direction: FloatArray, resolution: int) -> 
     matrix = np.eye(4)
     matrix[:3, :3] = axes / radius
     matrix[2] *= -0.5  # nearer is less; all lies within the radius
-    seen = surface(buffers, Shot(matrix, plant.center, resolution, resolution))
+    seen = surface(buffers, Shot(matrix, plant.center, resolution, resolution), lit=lit)
+    light = None
+    if lit is None and has_light(plant):
+        light = np.column_stack([seen.exposure, seen.transmission]).astype(np.float64).clip(0, 1)
+        if any(material.double_sided for material in plant.materials):
+            away = seen.normal @ direction < 0  # as of a crown's leaves; it is drawn turned round
+            light[away, :2] = light[away, 1::-1]
     return Candidates(
         seen.position, seen.normal.astype(np.float64), seen.color.astype(np.float64),
-        plant.face_material[seen.face], 2 * radius / resolution,
+        plant.face_material[seen.face], 2 * radius / resolution, light,
     )  # fmt: skip
 
 
 def joined(some: list[Candidates]) -> Candidates:
-    """All of them, in order."""
+    """All of them, in order, of one plant."""
+    light = [one.light for one in some if one.light is not None]
     return Candidates(
         np.concatenate([one.position for one in some]),
         np.concatenate([one.normal for one in some]),
         np.concatenate([one.color for one in some]),
         np.concatenate([one.material for one in some]),
         some[0].pixel_m,
+        np.concatenate(light) if light else None,
     )
 
 

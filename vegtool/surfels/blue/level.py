@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vegtool.arrays import FloatArray
+from vegtool.baking.bake import transmission_tint
 from vegtool.formats.ply_surfels import ply_bytes
 from vegtool.gl.pictures import BakedLight
 from vegtool.gl.upload import PlantBuffers
@@ -54,12 +55,13 @@ def sampled(
     materials = buffers.plant.materials
     with timed(seconds, "candidates"):
         found = enough(
-            buffers, count, resolution_for(count), lambda stage, f: progress(stage, SEEN * f)
+            buffers, count, resolution_for(count), lambda stage, f: progress(stage, SEEN * f), lit
         )
     with timed(seconds, "order"):
         surfels = ordered(
             found, count, seed=seed, unlit=lit is not None,
             double_sided=any(material.double_sided for material in materials),
+            tint=transmission_tint(buffers.plant),
         )  # fmt: skip
     progress("sizes", ORDERED)
     with timed(seconds, "sizes"):

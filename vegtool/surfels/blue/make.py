@@ -9,8 +9,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 
 from vegtool.arrays import Picture, unit
+from vegtool.baking.bake import transmission_tint
 from vegtool.gl.upload import PlantBuffers
 from vegtool.measure.pictures import truth
 from vegtool.measure.views import Camera
@@ -52,6 +54,7 @@ def surfels_of(
     surfels = ordered(
         found, count, seed=seed, unlit=all(material.unlit for material in materials),
         double_sided=any(material.double_sided for material in materials),
+        tint=transmission_tint(buffers.plant),
     )  # fmt: skip
     progress("sizes", ORDERED)
     return sized(surfels, buffers)
@@ -67,16 +70,19 @@ def sized(surfels: SurfelSet, buffers: PlantBuffers) -> SurfelSet:
 
 
 def ordered(
-    found: Candidates, count: int, *, seed: int = 0, unlit: bool = False, double_sided: bool = True
-) -> SurfelSet:
-    """The same of candidates, all of size 1."""
+    found: Candidates, count: int, *, seed: int = 0, unlit: bool = False,
+    double_sided: bool = True, tint: npt.ArrayLike = (1.0, 1.0, 1.0),
+) -> SurfelSet:  # fmt: skip
+    """The same of candidates, all of size 1. tint: (3,) of light that passes through."""
     order = farthest_order(found.position, count, seed=seed)
-    values = np.hstack([found.color, found.normal])
+    light = None if unlit else found.light
+    values = np.hstack([found.color, found.normal, *(() if light is None else (light,))])
     mean = averaged(found.position, values, order, normals=found.normal, normal_weight=NORMALS)
-    normal = unit(mean[:, 3:])
+    normal = unit(mean[:, 3:6])
     flat = (normal == 0).all(axis=1)  # of opposite sides alike
     normal[flat] = found.normal[order][flat]
     position = found.position[order]
     return SurfelSet(
-        position, normal, mean[:, :3], spacing(position), unlit=unlit, double_sided=double_sided
-    )
+        position, normal, mean[:, :3], spacing(position), unlit=unlit, double_sided=double_sided,
+        light=None if light is None else mean[:, 6:], transmission_tint=np.asarray(tint),
+    )  # fmt: skip
