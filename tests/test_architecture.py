@@ -14,7 +14,7 @@ PACKAGE = Path(__file__).parent.parent / "vegtool"
 
 GROUND = {
     "errors", "arrays", "options", "progress", "seeding", "srgb", "timing",
-    "plant", "lod", "surfel_set", "vegtool",
+    "plant", "lod", "surfel_set", "display", "later", "vegtool",
 }  # fmt: skip
 """Contracts that every room may import."""
 
