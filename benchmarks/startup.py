@@ -45,6 +45,7 @@ PACKAGES = (
 """That vegtool may load, beside typer and rich, which every command line loads."""
 READING = frozenset({"numpy", "PIL"})
 DRAWING = READING | {"scipy", "moderngl"}
+MAKING = DRAWING | {"skimage", "fast_simplification"}
 NORMALS = {"normals", "balance"}
 """Stages of levels that are drawn with normals."""
 
@@ -111,12 +112,7 @@ def cases(folder: Path) -> list[Case]:
         Case("--help", ("--help",)),
         Case("convert --help", ("convert", "--help")),
         Case("inspect", ("inspect", plant), plant, READING),
-        Case(
-            "convert --prelit",
-            ("convert", plant, *lit),
-            plant,
-            DRAWING | {"skimage", "fast_simplification"},
-        ),
+        Case("convert --prelit", ("convert", plant, *lit), plant, MAKING),
         Case("preview, a model", ("preview", plant, *shot), plant, DRAWING),
         Case("preview, its levels", ("preview", levels, *shot), levels, DRAWING),
     ]
