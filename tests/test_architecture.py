@@ -10,11 +10,14 @@ from pathlib import Path
 
 import pytest
 
+from vegtool.formats.gltf import plant_glb
+from vegtool.growth import sample
+
 PACKAGE = Path(__file__).parent.parent / "vegtool"
 
 GROUND = {
     "errors", "arrays", "options", "progress", "seeding", "srgb", "timing",
-    "plant", "lod", "surfel_set", "vegtool",
+    "plant", "lod", "surfel_set", "display", "later", "vegtool",
 }  # fmt: skip
 """Contracts that every room may import."""
 
@@ -125,21 +128,39 @@ def test_only_gl_imports_moderngl_and_only_formats_loads_models(path: Path) -> N
         assert "trimesh" not in roots
 
 
-@pytest.mark.parametrize(
-    "code",
-    [
-        "import vegtool",
-        "from vegtool.cli import run; run(['--help'])",
-        "from vegtool.cli import run; run(['convert', '--help'])",
-        "from vegtool.cli import run; run(['report', '--help'])",
-        "from vegtool.cli import run; run(['preview', '--help'])",
-        "from vegtool.cli import run; run(['sample', '--help'])",
-    ],
-)
-def test_starting_up_loads_nothing_heavy(code: str) -> None:
+def loaded_by(code: str) -> set[str]:
+    """Names of all modules that a program of its own loads."""
     report = "; import sys, json; print('LOADED' + json.dumps(sorted(sys.modules)))"
     done = subprocess.run(
         [sys.executable, "-c", code + report], capture_output=True, text=True, check=True
     )
-    loaded = {name.split(".")[0] for name in json.loads(done.stdout.split("LOADED")[1])}
-    assert not loaded & set(HEAVY)
+    return set(json.loads(done.stdout.split("LOADED")[1]))
+
+
+def roots(names: set[str]) -> set[str]:
+    return {name.split(".")[0] for name in names}
+
+
+def test_the_package_alone_is_one_module() -> None:
+    loaded = loaded_by("import vegtool")
+    assert {name for name in loaded if name.startswith("vegtool")} == {"vegtool"}
+    assert not roots(loaded) & {"numpy", "typer", "rich", *HEAVY}
+
+
+def test_help_loads_no_numpy_and_nothing_heavy() -> None:
+    """Of all commands, one after the other: options are read, and nothing of what they are of."""
+    code = (
+        "import typer; from vegtool.cli import app, run; run(['--help']); run(['--version']); "
+        "[run([name, '--help']) for name in typer.main.get_command(app).commands]"
+    )
+    assert not roots(loaded_by(code)) & {"numpy", *HEAVY}
+
+
+def test_inspecting_loads_what_reads(tmp_path: Path) -> None:
+    """A plant of one trunk: where more stems have to be told apart, scipy does that."""
+    model = tmp_path / "one.glb"
+    model.write_bytes(plant_glb(sample("broadleaf", 1000)))
+    loaded = loaded_by(f"from vegtool.cli import run; run(['inspect', {str(model)!r}])")
+    assert roots(loaded) & set(HEAVY) == {"PIL"}, "which reads its textures"
+    assert not {"vegtool.lod", "vegtool.convert.chain", "vegtool.boxes.box"} & loaded
+    assert not {"vegtool.gl", "vegtool.baking.bake", "vegtool.preview.command"} & loaded

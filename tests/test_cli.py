@@ -231,7 +231,7 @@ def test_files_in_the_way_are_refused_before_the_work(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
     (tmp_path / name).write_text("the user's own")
-    monkeypatch.setattr("vegtool.batch.convert", lambda *_: pytest.fail("worked"))
+    monkeypatch.setattr("vegtool.convert.chain.convert", lambda *_: pytest.fail("worked"))
     assert run(["convert", str(model), "-o", str(tmp_path), *SMALL, *option]) == 1
     assert f"{name}: exists already" in capsys.readouterr().err
     assert contents(tmp_path).keys() == {name}

@@ -79,6 +79,27 @@ def test_a_level_with_its_light_needs_no_normals_and_no_light_of_a_client(prelit
             assert level.mesh.exposure is None
 
 
+def test_normals_are_not_touched(
+    bush: Plant, prelit: LodChain, unlit: LodChain, options: ConvertOptions,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    """Neither drawn nor read back nor balanced: those are stages of levels that clients light."""
+    of_normals = {"normals", "balance"}
+    stages = {stage for level in unlit.levels for stage in level.seconds}
+    assert stages & of_normals
+    assert "normals" in stages or not any(level.atlas for level in unlit.levels)
+    assert not {stage for level in prelit.levels for stage in level.seconds} & of_normals
+
+    def channels(normals: bool, light: bool) -> tuple[str, ...]:
+        assert not normals and not light, "a texture that nothing is to be drawn into"
+        return ()
+
+    monkeypatch.setattr("vegtool.gl.pictures._channels", channels)
+    monkeypatch.setattr("vegtool.refine.level.balanced", lambda *_: pytest.fail("balanced"))
+    again = convert(bush, replace(options, prelit=True, sun=SUN), BY_RULE)
+    assert level_glb(again.levels[1], "level") == level_glb(prelit.levels[1], "level")
+
+
 def test_it_says_of_which_sun(prelit: LodChain, unlit: LodChain) -> None:
     assert prelit.baked == Sun(60, 40).as_dict()
     assert prelit.options["sun"] == SUN and prelit.options["prelit"] is True

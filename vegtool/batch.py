@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 from time import perf_counter
 from typing import Any
 
-from vegtool.convert import ConvertOptions, convert, endings
+from vegtool.convert import ConvertOptions
 from vegtool.errors import InputError, UsageError, VegtoolError, unknown
 from vegtool.formats import READERS, ReadOptions, read_plant
 from vegtool.lod import LodChain, ShadowProxy
@@ -117,6 +117,7 @@ def convert_file(job: Job, task: Task, progress: Progress = silent) -> Outcome:
     A dry run does all of it but the writing, so that what it says is exact.
     Raises the errors of reading, converting and writing; then nothing was written.
     """
+    from vegtool.convert import convert, endings
     from vegtool.formats.atomic import check_free
     from vegtool.formats.gltf import file_names, write_chain
     from vegtool.measure.chain import misses

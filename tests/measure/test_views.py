@@ -7,8 +7,8 @@ import pytest
 
 from vegtool.errors import UsageError
 from vegtool.lod import Display
+from vegtool.measure.options import ELEVATIONS
 from vegtool.measure.views import (
-    ELEVATIONS,
     MARGIN,
     Camera,
     around,

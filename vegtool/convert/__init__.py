@@ -1,7 +1,7 @@
 """The pipeline for one plant: options, what makes levels by them, and the chain of these."""
 
-from vegtool.convert.chain import as_lit, budget_notes, convert, endings
-from vegtool.convert.makers import billboard_counts, level_maker, near_distances, near_pixels
+from typing import TYPE_CHECKING
+
 from vegtool.convert.options import (
     LEVEL_RATIO,
     MOST_BILLBOARDS,
@@ -11,6 +11,19 @@ from vegtool.convert.options import (
     TRIANGLES_PER_BILLBOARD,
     ConvertOptions,
 )
+from vegtool.later import later
+
+if TYPE_CHECKING:
+    from vegtool.convert.chain import as_lit, budget_notes, convert, endings
+    from vegtool.convert.makers import billboard_counts, level_maker, near_distances, near_pixels
+else:
+    __getattr__ = later(
+        __name__,
+        {
+            "chain": ("as_lit", "budget_notes", "convert", "endings"),
+            "makers": ("billboard_counts", "level_maker", "near_distances", "near_pixels"),
+        },
+    )
 
 __all__ = [
     "LEVEL_RATIO",

@@ -8,9 +8,9 @@ from typing import get_args
 from vegtool.baking.options import BakeOptions
 from vegtool.boxes.options import BoxOptions, Shape
 from vegtool.clustering import METHODS, ClusterOptions
+from vegtool.display import Display
 from vegtool.errors import UsageError
 from vegtool.lighting.light import Sun
-from vegtool.lod import Display
 from vegtool.options import flag_of, option, same_option
 from vegtool.surfels.options import SurfelOptions
 

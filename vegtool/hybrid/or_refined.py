@@ -10,12 +10,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from vegtool.hybrid.level import hybrid_level
-from vegtool.hybrid.options import Budget
-from vegtool.hybrid.reduction import FEWEST
 from vegtool.lod import Level
 from vegtool.measure.scores import scores
-from vegtool.meshes.pieces import all_welded, pieces
 from vegtool.plant import Plant
 from vegtool.progress import Progress, part_of, silent
 from vegtool.refine.level import Source, Wanted, refined_level
@@ -25,6 +21,9 @@ def refined_or_hybrid(source: Source, wanted: Wanted, progress: Progress = silen
     """The level that errs less (FLIP) at the nearest distance, of no more triangles either way."""
     if not wanted.textured or not mesh_holds(source.plant, wanted.triangles):
         return refined_level(source, wanted, progress)
+    from vegtool.hybrid.level import hybrid_level  # most plants have leaves, and need none
+    from vegtool.hybrid.options import Budget
+
     refined = refined_level(source, wanted, part_of(progress, 0.0, 0.4))
     hybrid = hybrid_level(
         source, wanted, Budget(wanted.triangles), progress=part_of(progress, 0.4, 0.6)
@@ -41,5 +40,8 @@ def mesh_holds(plant: Plant, triangles: int) -> bool:
     """Whether so many can show all connected pieces of a plant, of which alpha cuts out nothing."""
     if any(material.alpha_mode == "mask" for material in plant.materials):
         return False
+    from vegtool.hybrid.reduction import FEWEST
+    from vegtool.meshes.pieces import all_welded, pieces
+
     count, _ = pieces(all_welded(plant).faces)
     return FEWEST * count <= triangles

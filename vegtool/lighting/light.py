@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import cos, radians, sin
+from math import cos, isfinite, radians, sin
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from vegtool.arrays import FloatArray
 from vegtool.errors import UsageError
+
+if TYPE_CHECKING:
+    from vegtool.arrays import FloatArray
 
 SUN_DEG = 0.53
 """Degrees: diameter of the sun's disc, seen from the earth (31.6 to 32.7 minutes of arc)."""
+
+
+def _from(x: float, y: float, z: float) -> FloatArray:
+    import numpy as np  # not where options are read, which have a sun
+
+    return np.array([x, y, z])
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,7 +26,7 @@ class Light:
     """direction: (3,) towards the sun, of any length. sun: what it adds, as a factor of the albedo,
     to what faces it. sky_above, sky_below: what the sky and the ground add to what faces them."""
 
-    direction: FloatArray = field(default_factory=lambda: np.array([0.5, 1.0, 0.7]))
+    direction: FloatArray = field(default_factory=lambda: _from(0.5, 1.0, 0.7))
     sun: float = 0.70
     sky_above: float = 0.38
     sky_below: float = 0.20
@@ -27,6 +34,8 @@ class Light:
     @property
     def unit(self) -> FloatArray:
         """(3,) unit vector towards the sun."""
+        import numpy as np
+
         return np.asarray(self.direction / np.linalg.norm(self.direction))
 
 
@@ -42,7 +51,7 @@ class Sun:
         """(3,) unit vector towards the sun."""
         azimuth, elevation = radians(self.azimuth_deg), radians(self.elevation_deg)
         flat = cos(elevation)
-        return np.array([flat * sin(azimuth), sin(elevation), flat * cos(azimuth)])
+        return _from(flat * sin(azimuth), sin(elevation), flat * cos(azimuth))
 
     @property
     def light(self) -> Light:
@@ -71,7 +80,7 @@ class Sun:
             raise UsageError(
                 f"{flag}: expected azimuth and elevation in degrees, such as 135,40; got {text!r}"
             ) from None
-        if not (np.isfinite(azimuth) and -90 <= elevation <= 90):
+        if not (isfinite(azimuth) and -90 <= elevation <= 90):
             raise UsageError(
                 f"{flag}: expected an azimuth and an elevation from -90 to 90 degrees; got {text}"
             )

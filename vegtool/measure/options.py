@@ -5,8 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from vegtool.errors import UsageError
-from vegtool.measure.views import ELEVATIONS
 from vegtool.options import option
+
+ELEVATIONS = {"ground": (-15.0, 30.0), "aerial": (15.0, 90.0), "all": (-90.0, 90.0)}
+"""Degrees above the horizon, from the plant to the eye: a walker among plants of all sizes, a
+flight above them, everything."""
 
 
 @dataclass(frozen=True)

@@ -14,11 +14,9 @@ import numpy as np
 from vegtool.arrays import FloatArray
 from vegtool.errors import UsageError
 from vegtool.lod import Display
+from vegtool.measure.options import ELEVATIONS
 from vegtool.plant import Plant
 
-ELEVATIONS = {"ground": (-15.0, 30.0), "aerial": (15.0, 90.0), "all": (-90.0, 90.0)}
-"""Degrees above the horizon, from the plant to the eye: a walker among plants of all sizes, a
-flight above them, everything."""
 SUN_ELEVATIONS = (15.0, 75.0)
 """Degrees above the horizon of the suns of a set of views."""
 MARGIN = 4

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 from vegtool.errors import OutputError, UsageError
 from vegtool.formats import ReadOptions
 from vegtool.formats.atomic import FileSet, check_free
+from vegtool.formats.tileset import TILESET
 from vegtool.preview.options import PreviewOptions
-from vegtool.preview.tileset import tileset_at
 from vegtool.progress import Progress
 from vegtool.surfels.options import SUFFIX
 
@@ -78,10 +78,9 @@ def run_preview(
     if wanted.html is not None:
         with bar("preview"):
             return _write_page(wanted)
-    from vegtool.preview.tile_world import read_tile_world
     from vegtool.preview.world import parts_of, read_world, way_of
 
-    tiles = tileset_at(wanted.path)
+    tiles = _tileset_at(wanted.path)
     if tiles is not None:
         _check_alone(wanted, options, read, "a tileset, whose plants stand", "tiles")
     surfels = _is_surfels(wanted.path)
@@ -107,6 +106,8 @@ def run_preview(
     with bar("preview") as progress:
         world: Place
         if tiles is not None:
+            from vegtool.preview.tile_world import read_tile_world
+
             world = read_tile_world(tiles)
         elif surfels:
             from vegtool.preview.surfel_world import read_surfel_world
@@ -141,7 +142,7 @@ def _check(wanted: Wanted, options: PreviewOptions, read: ReadOptions) -> None:
         raise UsageError("--stats: writes what frames took; add how many, --frames N")
     others = (wanted.scene, wanted.camera, wanted.out, wanted.screenshot, wanted.frames)
     plain = options == PreviewOptions() and read == ReadOptions()
-    if wanted.html is not None and tileset_at(wanted.path) is not None:
+    if wanted.html is not None and _tileset_at(wanted.path) is not None:
         raise UsageError(
             "--html: writes a page of converted plants; a tileset is for viewers of 3D Tiles, and "
             "has none. Leave out --html, or name the folder of the plants"
@@ -176,6 +177,12 @@ def _check_alone(
         )
     if options.fade != PreviewOptions().fade:
         raise UsageError(f"--fade: {they} follow each other in their own way; leave it out")
+
+
+def _tileset_at(path: Path) -> Path | None:
+    """The tileset.json that a path is, or that lies in it; None for anything else."""
+    file = path / TILESET if path.is_dir() else path
+    return file if file.name == TILESET and file.exists() else None
 
 
 def _is_surfels(path: Path) -> bool:
@@ -216,7 +223,7 @@ def _inputs(wanted: Wanted, scene: Scene | None, way: Path | None) -> list[Path]
 def _beside(file: Path, read: Path) -> bool:
     """Whether a file may belong to what is read: a picture of a model that is no single file, or
     anything among tiles."""
-    tiles = tileset_at(read)
+    tiles = _tileset_at(read)
     if tiles is not None:
         return file.resolve().is_relative_to(tiles.parent.resolve())
     return read.suffix.lower() in SEVERAL_FILES and _same(file.parent, read.parent)

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from math import inf
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from vegtool.formats.atomic import FileSet
 from vegtool.formats.png import encode
 from vegtool.gl.landscape import GROUND_COLOR
 from vegtool.gl.screen import Screen
-from vegtool.gl.window import Backdrop, Window, open_window
 from vegtool.lighting.light import Light, Sun
 from vegtool.preview.command import Result, Say, Wanted, as_json, part
 from vegtool.preview.controls import Fly, Orbit, orbiting
@@ -31,6 +30,9 @@ from vegtool.preview.show import SKY, Show
 from vegtool.preview.size_control import LARGEST_PX, SizeControl
 from vegtool.preview.state import FIRST_DETAIL, LEAST_DETAIL, State
 from vegtool.progress import Progress
+
+if TYPE_CHECKING:
+    from vegtool.gl.window import Backdrop, Window
 
 FPS = 30.0
 """Of frames that no path gives a time."""
@@ -144,6 +146,8 @@ def shown_in_window(
     name: Path, world: Place, path: CameraPath | None, options: PreviewOptions, say: Say
 ) -> Result:
     """Open a window and wait until it is closed. path: the way that is walked at first."""
+    from vegtool.gl.window import open_window
+
     show = show_of(world, options)
     keeper = Keeper(Path(), say)
     show.keeper = keeper
@@ -214,6 +218,8 @@ def _backdrop(world: Place, light: Light) -> Backdrop | None:
     """The ground around the eye, while the plants are loaded."""
     if world.ground is None:
         return None
+    from vegtool.gl.window import Backdrop
+
     eye, ground = world.start, world.ground
     around = np.array([BEHIND_M, np.inf, BEHIND_M])
     low, high = eye.position - around, eye.position + around

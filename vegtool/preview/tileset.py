@@ -23,7 +23,7 @@ from vegtool.formats import read_plant
 from vegtool.formats.beside import find_beside
 from vegtool.formats.gltf_data import GltfFile, open_gltf
 from vegtool.formats.gltf_tile import INSTANCING
-from vegtool.formats.tileset import CLIENT_PX, TILESET
+from vegtool.formats.tileset import CLIENT_PX
 from vegtool.plant import Plant
 
 LongArray = npt.NDArray[np.int64]
@@ -91,12 +91,6 @@ class Copies:
     yaw: FloatArray
     scale: FloatArray
     tint: FloatArray
-
-
-def tileset_at(path: Path) -> Path | None:
-    """The tileset.json that a path is, or that lies in it; None for anything else."""
-    file = path / TILESET if path.is_dir() else path
-    return file if file.name == TILESET and file.exists() else None
 
 
 def read_tileset(file: Path) -> Tileset:

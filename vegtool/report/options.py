@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from vegtool.clustering import METHODS
 from vegtool.convert import MOST_BILLBOARDS, SURFELS, ConvertOptions
+from vegtool.display import Display
 from vegtool.errors import UsageError
-from vegtool.lod import Display
 from vegtool.measure.options import MeasureOptions
 from vegtool.options import option, same_option
 
