@@ -25,6 +25,8 @@ WIDELY_SPREAD = 0.01
 be: slivers, whose texels are as large as one likes."""
 LEAST_PIXELS = 1e-6
 """To a metre: less is seen of nothing."""
+ROUNDING = 1e-6
+"""Of halvings."""
 FEWEST = 4
 """Texels on a side, below which no texture is made smaller."""
 
@@ -70,7 +72,7 @@ def resolved(plant: Plant, per_metre: float) -> Plant:
         if density <= per_metre or min(wide, high) <= FEWEST:
             return texture
         fine, least = density / max(per_metre, LEAST_PIXELS), min(wide, high) / FEWEST
-        halvings = int(log2(min(fine, least)))
+        halvings = int(log2(min(fine, least)) + ROUNDING)
         if not halvings:
             return texture
         mips = mip_levels(texture.pixels, srgb)
