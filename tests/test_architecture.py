@@ -14,7 +14,7 @@ PACKAGE = Path(__file__).parent.parent / "vegtool"
 
 GROUND = {
     "errors", "arrays", "options", "progress", "seeding", "srgb", "timing",
-    "plant", "lod", "surfel_set", "vegtool",
+    "plant", "lod", "limits", "surfel_set", "vegtool",
 }  # fmt: skip
 """Contracts that every room may import."""
 
@@ -48,8 +48,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "camera_path": {"scene"},
     "needs": {"camera_path", "formats", "lighting", "scene", "tiles"},
     "preview": {
-        "camera_path", "elements", "formats", "gl", "lighting", "measure", "scene", "surfels",
-        "tiles",
+        "camera_path", "elements", "formats", "gl", "lighting", "measure", "needs", "scene",
+        "surfels", "tiles",
     },
     "stability": {
         "branches", "clustering", "boxes", "gl", "lighting", "baking", "measure", "refine",
@@ -67,7 +67,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "__main__": {"cli"},
     "cli": {
         "batch", "console", "convert", "doctor", "flags", "formats", "growth", "inspect",
-        "measure", "outcomes", "preview", "report", "scene", "stability", "tiles",
+        "measure", "needs", "outcomes", "preview", "report", "scene", "stability", "tiles",
     },
 }  # fmt: skip
 
