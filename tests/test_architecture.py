@@ -17,7 +17,7 @@ PACKAGE = Path(__file__).parent.parent / "vegtool"
 
 GROUND = {
     "errors", "arrays", "options", "progress", "seeding", "srgb", "timing",
-    "plant", "lod", "surfel_set", "display", "later", "vegtool",
+    "plant", "lod", "limits", "surfel_set", "display", "later", "vegtool",
 }  # fmt: skip
 """Contracts that every room may import."""
 
@@ -51,8 +51,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "camera_path": {"scene"},
     "needs": {"camera_path", "formats", "lighting", "scene", "tiles"},
     "preview": {
-        "camera_path", "elements", "formats", "gl", "lighting", "measure", "scene", "surfels",
-        "tiles",
+        "camera_path", "elements", "formats", "gl", "lighting", "measure", "needs", "scene",
+        "surfels", "tiles",
     },
     "stability": {
         "branches", "clustering", "boxes", "gl", "lighting", "baking", "measure", "refine",

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
@@ -19,6 +19,7 @@ from typing import Any
 from vegtool.convert import ConvertOptions
 from vegtool.errors import InputError, UsageError, VegtoolError, unknown
 from vegtool.formats import READERS, ReadOptions, read_plant
+from vegtool.limits import Limits
 from vegtool.lod import LodChain, ShadowProxy
 from vegtool.measure.options import MeasureOptions
 from vegtool.progress import Progress, silent
@@ -69,6 +70,8 @@ class Task:
     strict: bool = False
     inputs: tuple[Path, ...] = ()
     """The other files of the batch: like a job's own, they and what lies beside them are kept."""
+    limits: Mapping[Path, Limits] = field(default_factory=dict)
+    """The eyes of a scene that plants are for, by their files; of others, any."""
 
 
 def find_jobs(inputs: Sequence[Path]) -> list[Job]:
@@ -132,7 +135,10 @@ def convert_file(job: Job, task: Task, progress: Progress = silent) -> Outcome:
     names += [job.name + ending for ending in endings(task.convert)]
     inputs = (job.source, *task.inputs)
     check_free(task.folder, names, task.force, inputs)
-    chain = convert(plant, task.convert, task.measure, lambda s, f: progress(s, 0.05 + 0.8 * f))
+    chain = convert(
+        plant, task.convert, task.measure, lambda s, f: progress(s, 0.05 + 0.8 * f),
+        task.limits.get(job.source),
+    )  # fmt: skip
     options = {**asdict(task.read), **chain.options}
     chain = replace(chain, name=job.name, options=options)
     progress("contact sheet", 0.85)

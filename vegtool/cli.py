@@ -10,6 +10,7 @@ import logging
 import re
 import signal
 import sys
+from dataclasses import replace
 from functools import partial
 from io import TextIOWrapper
 from pathlib import Path
@@ -104,7 +105,7 @@ def convert_command(
         typer.Option(
             "--scene",
             help="A scene file: its light, and its camera where --fov and --image-height are not "
-            "given.",
+            "given; what none of its viewers sees of its species is left out.",
             metavar="FILE.toml",
             parser=_path,
         ),
@@ -137,20 +138,27 @@ def convert_command(
 
     console = Console(-1 if quiet else verbose, json)
     of_scene: list[str] = []
+    described = None
     if scene is not None:
+        from vegtool.needs.plants import limits_of, says_so
         from vegtool.scene import read_scene, unused, with_scene
 
         described = read_scene(scene)
         convert = with_scene(convert, described)
-        of_scene = unused(described, convert)
-        for note in of_scene:
-            console.say(note)
+        of_scene = unused(described, convert, says_so(described))
     todo = find_jobs(inputs)
     sources = tuple(job.source for job in todo)
     task = Task(
         out, read, convert, measure, force,
         depth=depth, packed=packed, dry_run=dry_run, strict=strict, inputs=sources,
     )  # fmt: skip
+    if described is not None:
+        with console.bar("scene") as progress:
+            limited = limits_of(described, sources, read, progress)
+        task = replace(task, limits=limited.limits)
+        of_scene += limited.notes
+        for note in of_scene:
+            console.say(note)
     outcomes = []
     with console.bar("convert") as progress:
         for outcome in convert_files(todo, task, jobs, _file_progress(todo, progress)):

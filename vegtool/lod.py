@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from vegtool.arrays import ByteArray, FloatArray, IntArray, checked, unit
 from vegtool.display import Display as Display  # which all that states distances imports
 from vegtool.plant import Plant
 from vegtool.surfel_set import SurfelSet
+
+if TYPE_CHECKING:
+    from vegtool.limits import Limits, Omitted
 
 Kind = Literal["mesh", "billboards", "hybrid", "surfels"]
 
@@ -289,7 +292,8 @@ class ShadowProxy:
 
 @dataclass(frozen=True, eq=False)
 class LodChain:
-    """All levels of a plant: levels[0] is the original, then coarser and coarser.
+    """All levels of a plant: levels[0] is the original, then coarser and coarser; of a chain that
+    is for the eyes of a scene, the finest that is of use there.
 
     options: everything that shaped the result, as plain values, for the manifest.
     notes: sentences for the user: levels that were left out, and why.
@@ -298,6 +302,8 @@ class LodChain:
     shadow: what throws the plant's shadow in place of its levels, or None.
     misses: sentences on limits that were asked for, and could not be kept.
     beside: further files of it, by the ending of their names.
+    limits: the eyes that it is for, or None for any; omitted: what it does without for that.
+    plant: the original, where that is no level of it; else None.
     """
 
     name: str
@@ -310,6 +316,23 @@ class LodChain:
     shadow: ShadowProxy | None = None
     misses: tuple[str, ...] = ()
     beside: Mapping[str, bytes] = field(default_factory=dict)
+    limits: Limits | None = None
+    omitted: tuple[Omitted, ...] = ()
+    plant: Plant | None = None
+
+    @property
+    def original(self) -> Plant:
+        """What the levels stand for. Raises ValueError for a chain that does not know."""
+        found = self.levels[0].mesh if self.plant is None else self.plant
+        if found is None:
+            raise ValueError("LodChain: level 0 must be a mesh, or the original be given")
+        return found
+
+    @property
+    def coarser(self) -> dict[int, Level]:
+        """The levels that stand for the original, by their index."""
+        first = 1 if self.plant is None else 0
+        return dict(list(enumerate(self.levels))[first:])
 
 
 @dataclass(frozen=True, eq=False)

@@ -102,6 +102,8 @@ USED = {
     ("light", "sun"),
 }
 """Keys that change what `convert` does."""
+OF_EYES = ("camera", "terrain", "species", "placement")
+"""Tables that do so too, where they say from where plants are seen."""
 
 
 MOST = 1e18
@@ -283,19 +285,24 @@ def with_scene(options: ConvertOptions, scene: Scene) -> ConvertOptions:
     return replace(options, **display, sun=_agreed_sun(options, scene))
 
 
-def unused(scene: Scene, options: ConvertOptions) -> list[str]:
-    """Sentences on what `convert` reads and, with these options, does not use."""
+def unused(scene: Scene, options: ConvertOptions, eyes: bool = False) -> list[str]:
+    """Sentences on what `convert` reads and, with these options, does not use. eyes: whether the
+    scene says from where plants are seen."""
     notes = []
     if scene.light is not None and scene.light.sun is not None and not options.prelit:
         notes.append(
             f"{scene.at('light', 'sun')}: sun changes nothing without --prelit: levels are lit by "
             "whoever shows them"
         )
-    used_tables = {table for table, _ in USED}
+    used_tables = {table for table, _ in USED} | set(OF_EYES if eyes else ())
     keys = [place for place in scene.lines if len(place) == 2 and place[0] in used_tables]
     tables = dict.fromkeys(str(place[0]) for place in scene.lines)
     found = [_header(table) for table in tables if table not in used_tables]
-    found += [f"[{table}] {key}" for table, key in keys if (table, key) not in USED]
+    found += [
+        f"[{table}] {key}"
+        for table, key in keys
+        if (table, key) not in USED and not (eyes and table in OF_EYES)
+    ]
     if found:
         listed = ", ".join(found)
         notes.append(f"{scene.path}: checked, but of no effect on convert yet: {listed}")

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, replace
+from typing import TYPE_CHECKING
 
 from vegtool.convert.makers import level_maker, most_billboards
 from vegtool.convert.options import (
@@ -24,9 +25,12 @@ from vegtool.convert.options import (
     TRIANGLES_PER_BILLBOARD,
     ConvertOptions,
 )
+from vegtool.convert.seen import beginning, complete, drawn, first_needed, for_span, omitted
+from vegtool.errors import QualityError
 from vegtool.lighting.crown import crown_normals
 from vegtool.lighting.leaves import translucent
 from vegtool.lighting.light import Sun
+from vegtool.limits import ANYWHERE, Limits, Omitted, Span
 from vegtool.lod import Level, LodChain
 from vegtool.measure.distances import rounded_up
 from vegtool.measure.options import MeasureOptions
@@ -36,23 +40,29 @@ from vegtool.plant import Plant
 from vegtool.progress import Progress, silent
 from vegtool.surfels.options import POINTS_SUFFIX, SUFFIX
 
+if TYPE_CHECKING:
+    from vegtool.measure.scores import TruthsAt
+
 
 def convert(
     plant: Plant,
     options: ConvertOptions | None = None,
     measure: MeasureOptions | None = None,
     progress: Progress = silent,
+    limits: Limits | None = None,
 ) -> LodChain:
     """Make the chain of levels of one plant.
 
     levels[0] is the plant itself. Of the others there is one at least, and no more than save
     triangles and may be used somewhere; `notes` name those that are of no use, and those that are
-    used farther than their coverage keeps. Raises UsageError for options out of range, QualityError
-    where no level keeps to `measure.max_error`, CapabilityError where nothing can draw.
+    used farther than their coverage keeps. limits: the eyes that it is for; what none of them sees
+    is not made, be it a level or the plant itself (seen.py). Raises UsageError for options out of
+    range, QualityError where no level keeps to `measure.max_error`, CapabilityError where nothing
+    can draw.
     """
     from vegtool.baking.bake import PlantBuffers
     from vegtool.gl.sun import SunMaps
-    from vegtool.measure.chain import views_of, with_distances
+    from vegtool.measure.chain import views_of
     from vegtool.measure.scores import Shadowed, TruthsAt
 
     options, measure = options or ConvertOptions(), measure or MeasureOptions()
@@ -61,7 +71,8 @@ def convert(
     sun = options.baked_sun
     plant = as_lit(plant, options)
     making = 1.0 if measure.measure == "off" else MAKING
-    levels = [Level("mesh", mesh=plant, geometric_error_m=(0.0, 0.0))]
+    original = Level("mesh", mesh=plant, geometric_error_m=(0.0, 0.0))
+    span = ANYWHERE if limits is None else limits.span(options.display)
     with ExitStack() as stack:
         buffers = stack.enter_context(PlantBuffers(plant))
         under = None
@@ -79,17 +90,33 @@ def convert(
             baked_from, truth_at, options, progress=lambda s, f: progress(s, before * f)
         )
         farthest = rounded_up(distance_of(plant, options.display, NEAR_LIMITS[0]))
-        wanted = make.wanted(plant, farthest)
-        for index, (count, near) in enumerate(wanted):
+        whole = make.wanted(plant, farthest)
+        wanted = for_span(whole, span, make.fewer)
+        first, made = first_needed(whole, span), dict[int, Level]()
+        while True:
+            levels = [original]
+            for index in range(first, len(wanted)):
+                if index not in made:
+                    count, near = wanted[index]
 
-            def report(stage: str, fraction: float, index: int = index) -> None:
-                done = before + (making - before) * (index + fraction) / len(wanted)
-                progress(f"LOD{index + 1}: {stage}", done)
+                    def report(stage: str, fraction: float, index: int = index) -> None:
+                        done = before + (making - before) * (index + fraction) / len(wanted)
+                        progress(f"LOD{index + 1}: {stage}", done)
 
-            level = replace(make(count, min(near, farthest), report), near_distance_m=near)
-            saves = level.triangles <= MOST_OF_PREVIOUS * levels[-1].triangles
-            if saves or (index == len(wanted) - 1 and len(levels) == 1):
-                levels.append(level)
+                    level = make(count, min(near, farthest), report)
+                    made[index] = replace(level, near_distance_m=near)
+                saves = made[index].triangles <= MOST_OF_PREVIOUS * levels[-1].triangles
+                if saves or (index == len(wanted) - 1 and len(levels) == 1):
+                    levels.append(made[index])
+            kept, notes = _measured(
+                plant, levels[1:], measure, options,
+                lambda stage, fraction: progress(stage, making + (1 - making) * fraction),
+                truth_at, span, finest=first == 0,
+            )  # fmt: skip
+            kept = drawn(kept, span)
+            if first == 0 or complete(kept, span):
+                break
+            first -= 1  # what was to be used there errs too much
         shadow = None
         if options.shadow_proxy is not None:
             from vegtool.refine.shadow_proxy import shadow_proxy
@@ -101,30 +128,29 @@ def convert(
                 lambda casting, seen, near_m: level_maker(casting, seen, options, casts=True)(
                     most, near_m, lambda stage, _: progress(stage, making)
                 ),
-                wanted[0][1],
+                wanted[first][1] if wanted else whole[0][1],
             )
-        kept, notes = with_distances(
-            plant,
-            levels[1:],
-            measure,
-            options.display,
-            lambda stage, fraction: progress(stage, making + (1 - making) * fraction),
-            truth_at,
-        )
         if options.refine != "none" and options.method != SURFELS:
             from vegtool.refine.reach import coverage_notes
 
             notes = (*notes, *coverage_notes(kept, truth_at))
     notes = (*notes, *light_notes(plant, sun))
-    misses, beside = (*budget_notes(kept, options), *make.misses), make.beside()
+    is_whole = not complete(kept, span)
+    misses = (*budget_notes(kept, options, int(is_whole)), *make.misses)
+    beside = make.beside()
     if SUFFIX in beside and (sun is not None or plant.exposure is not None):
         notes = (*notes, f"light that is baked is in the levels, not in {plant.name}{SUFFIX}")
     progress("levels", 1.0)
     told = {**asdict(options), **asdict(measure)}
     baked = {} if sun is None else sun.as_dict()
+    left_out = tuple[Omitted, ...]()
+    if limits is not None:
+        left_out = omitted(whole, first, len(wanted), original, is_whole, limits)
+    if left_out:
+        notes = (*notes, f"left out for the scene: {_listed(left_out)}")
     return LodChain(
         plant.name,
-        (levels[0], *kept),
+        (original, *kept) if is_whole else beginning(kept),
         options.display,
         options.seed,
         told,
@@ -133,7 +159,34 @@ def convert(
         shadow,
         misses,
         beside,
+        limits,
+        left_out,
+        None if is_whole else plant,
     )
+
+
+def _measured(
+    plant: Plant, levels: Sequence[Level], measure: MeasureOptions, options: ConvertOptions,
+    progress: Progress, truth_at: TruthsAt, span: Span, finest: bool,
+) -> tuple[tuple[Level, ...], tuple[str, ...]]:  # fmt: skip
+    """`with_distances`; none where there are none, or where none keeps to the limit and there are
+    finer ones that may."""
+    from vegtool.measure.chain import with_distances
+
+    if not levels:
+        return (), ()
+    try:
+        return with_distances(plant, levels, measure, options.display, progress, truth_at, span)
+    except QualityError:
+        if finest:
+            raise
+        return (), ()
+
+
+def _listed(left_out: Sequence[Omitted]) -> str:
+    levels = sum(one.what.startswith("a level") for one in left_out)
+    others = [one.what for one in left_out if not one.what.startswith("a level")]
+    return ", ".join([*others, *([f"{levels} of its levels"] if levels else [])])
 
 
 def endings(options: ConvertOptions) -> tuple[str, ...]:
@@ -141,14 +194,16 @@ def endings(options: ConvertOptions) -> tuple[str, ...]:
     return {SURFELS: (POINTS_SUFFIX,), SURFEL_BILLBOARDS: (SUFFIX,)}.get(options.method, ())
 
 
-def budget_notes(levels: Sequence[Level], options: ConvertOptions) -> tuple[str, ...]:
-    """Sentences on hybrids of more triangles than were allowed."""
+def budget_notes(
+    levels: Sequence[Level], options: ConvertOptions, first: int = 1
+) -> tuple[str, ...]:
+    """Sentences on hybrids of more triangles than were allowed. first: number of the first."""
     if options.triangles is None:
         return ()
     over = [
         f"LOD{number}: no hybrid was found of {options.triangles:,} triangles or fewer; it has "
         f"{level.triangles:,}"
-        for number, level in enumerate(levels, start=1)
+        for number, level in enumerate(levels, start=first)
         if level.triangles > options.triangles
     ]
     return tuple(over)

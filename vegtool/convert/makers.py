@@ -67,6 +67,12 @@ class Maker:
         first = rounded_up(distance_of(plant, self.options.display, size))
         return list(zip(counts, near_distances(counts, first, farthest_m), strict=True))
 
+    def fewer(self, count: int, near_m: float, at_m: float) -> int:
+        """Of how many billboards a level is, for distances from at_m on, that would have `count` if
+        it were for those from near_m on: as along the chain, as many times fewer as it is farther.
+        """
+        return max(1, round(count * near_m / at_m))
+
     def beside(self) -> dict[str, bytes]:
         """Further files of the chain, by the ending of their names."""
         return {}
@@ -98,6 +104,9 @@ class SurfelBillboards(Maker):
             for count in billboard_counts(plant, self.options)
         ]
 
+    def fewer(self, count: int, near_m: float, at_m: float) -> int:
+        return count  # at most: the distance says how many
+
     def beside(self) -> dict[str, bytes]:
         from vegtool.surfels.options import SUFFIX
         from vegtool.surfels.store import surfels_bytes
@@ -125,6 +134,9 @@ class Surfels(Maker):
             (count, rounded_up(nearest_m(self.made_from.surfels, count, plant.radius, display)))
             for count in dict.fromkeys(counts)
         ]
+
+    def fewer(self, count: int, near_m: float, at_m: float) -> int:
+        return max(1, round(count * (near_m / at_m) ** 2))
 
     def beside(self) -> dict[str, bytes]:
         from vegtool.surfels.blue.level import as_ply

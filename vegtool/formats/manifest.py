@@ -10,12 +10,14 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
 from importlib import resources
+from math import isinf
 from pathlib import Path
 from typing import Any
 
 import vegtool
 from vegtool.errors import InputError
 from vegtool.formats.ramp import written_texels
+from vegtool.limits import Limits
 from vegtool.lod import FADE_FRACTION, Level, LodChain, Measured, ShadowProxy, Spread
 from vegtool.surfel_set import SurfelSet
 
@@ -59,7 +61,7 @@ def manifest(
     """The manifest of a chain whose levels were written to `files`, one for each level, in order,
     and what throws its shadow to `shadow`.
 
-    The first is the combined file, which shows the original wherever MSFT_lod is not read.
+    The first is the combined file, which shows the first level wherever MSFT_lod is not read.
     Distances are for `chain.display`; errors are null where they were not measured. The same chain
     gives the same manifest: no time, no path.
     """
@@ -77,10 +79,38 @@ def manifest(
         "combined": {"file": files[0].name, "bytes": files[0].bytes},
         **({"sun": chain.baked} if chain.baked else {}),
         **({} if chain.shadow is None else {"shadow": _shadow(chain.shadow, shadow)}),
+        **({} if chain.limits is None else {"scene": _scene(chain, chain.limits)}),
         "levels": [
             _level(chain, level, file) for level, file in zip(chain.levels, files, strict=True)
         ],
     }
+
+
+def _scene(chain: LodChain, limits: Limits) -> dict[str, Any]:
+    """For which eyes the levels are, and what was left out for that."""
+    start, extent_deg = (_short(angle) for angle in limits.azimuth_deg)
+    low, high = (_short(angle) for angle in limits.elevation_deg)
+    bounds = chain.original.bounds
+    return {
+        "digest": limits.digest,
+        "nearest_m": _short(limits.nearest_m),
+        "farthest_m": None if isinf(limits.farthest_m) else _short(limits.farthest_m),
+        "azimuth_deg": {"start": start, "extent": extent_deg},
+        "elevation_deg": {"low": low, "high": high},
+        "fov_y_deg": limits.display.fov_y_deg,
+        "image_height_px": limits.display.image_height_px,
+        "bounds_m": bounds.tolist(),
+        "original": chain.plant is None,
+        "left_out": [
+            {key: value for key, value in asdict(one).items() if value is not None}
+            for one in chain.omitted
+        ],
+    }
+
+
+def _short(value: float) -> float:
+    """As many digits as are of use."""
+    return float(f"{value:.6g}")
 
 
 def _level(chain: LodChain, level: Level, file: LevelFile) -> dict[str, Any]:
@@ -156,10 +186,7 @@ def _spreads(
 
 def extent(chain: LodChain) -> float:
     """Metres: the original's."""
-    original = chain.levels[0].mesh
-    if original is None:
-        raise ValueError("LodChain: level 0 must be a mesh")
-    return original.extent
+    return chain.original.extent
 
 
 def screen_height_fraction(chain: LodChain, distance_m: float) -> float:

@@ -15,6 +15,7 @@ import numpy as np
 from vegtool.arrays import FloatArray
 from vegtool.errors import QualityError
 from vegtool.gl.upload import PlantBuffers
+from vegtool.limits import ANYWHERE, Span
 from vegtool.lod import Display, Level, Measured
 from vegtool.measure.bounds import distance_for_pixels
 from vegtool.measure.distances import LeftOut, limits, rounded_up, switch_distances
@@ -43,13 +44,16 @@ def with_distances(
     display: Display,
     progress: Progress = silent,
     truth_at: TruthsAt | None = None,
+    span: Span = ANYWHERE,
 ) -> tuple[tuple[Level, ...], tuple[str, ...]]:
     """The levels that may be used somewhere, with `near_distance_m` and `measured`; and a sentence
     on each that was left out.
 
     levels: coarser and coarser, without the original. truth_at: the plant's truths from
-    `views_of(options)`, where some are drawn already. Raises QualityError where none keeps to
-    `max_error` at any size, UsageError where no size is seen from outside the plant.
+    `views_of(options)`, where some are drawn already. span: where eyes may be: no level needs to
+    keep to a limit farther away, and some may begin there that would not go on beyond. Raises
+    QualityError where none keeps to `max_error` at any size, UsageError where no size is seen from
+    outside the plant.
     """
     if options.max_pixels is not None:
         pixels = options.max_pixels
@@ -63,7 +67,7 @@ def with_distances(
     least_m = [max(pair) for pair in zip(least_m, _by_texels(levels, display), strict=True)]
     with ExitStack() as stack:
         bench = _Measuring(stack, plant, levels, options, display, truth_at)
-        return _by_error(bench, least_m, progress)
+        return _by_error(bench, least_m, progress, span)
 
 
 def views_of(options: MeasureOptions) -> tuple[View, ...]:
@@ -206,7 +210,7 @@ def _unmeasured(
 
 
 def _by_error(
-    bench: _Measuring, least_m: Sequence[float], progress: Progress
+    bench: _Measuring, least_m: Sequence[float], progress: Progress, span: Span
 ) -> tuple[tuple[Level, ...], tuple[str, ...]]:
     """Distances by measured error, and no less than `least_m`, (l,) metres."""
     options = bench.options
@@ -216,12 +220,15 @@ def _by_error(
         return bool(error <= _limits(np.array([live]), options)[0])
 
     distance_m = bench.distances()
+    if distance_m[-1] < span.nearest_m:  # what is measured is to be seen
+        distance_m = np.array([max(float(distance_m[-1]), min(least_m))])
     flips = bench.everything(distance_m, progress)
     while True:
         allowed, errors = _limits(flips[:, 0], options), list(flips[:, 1:].T)
-        starts = switch_distances(distance_m, errors, allowed, least_m, holds)
+        starts = switch_distances(distance_m, errors, allowed, least_m, holds, span.farthest_m)
         notes = _notes(bench.levels, starts)
-        if any(isinstance(start, float) for start in starts):
+        found = any(isinstance(start, float) for start in starts)
+        if found or distance_m[-1] >= span.farthest_m:
             break
         farther = np.array([rounded_up(2 * distance_m[-1])])
         if bench.pixels(farther[0]) < SMALLEST:

@@ -1,12 +1,14 @@
 """One picture of a chain: the original above, the levels below, where they are meant to be used.
 
-A column per level. Both pictures of a column are taken from the level's switch distance and shown
-magnified (nearest texel) to the same size, so that a person can compare pixel by pixel.
+A column per level. Both pictures of a column are taken from the level's switch distance, or that of
+the nearest eye where the scene has none as near, and shown magnified (nearest texel) to the same
+size, so that a person can compare pixel by pixel.
 """
 
 from __future__ import annotations
 
 from contextlib import ExitStack
+from dataclasses import replace
 from io import BytesIO
 
 import numpy as np
@@ -30,9 +32,10 @@ VIEW = direction(25.0, 8.0)
 
 def contact_sheet(chain: LodChain) -> bytes:
     """The sheet as PNG bytes."""
-    plant = chain.levels[0].mesh
-    assert plant is not None
-    levels = chain.levels[1:]
+    plant, levels = chain.original, chain.coarser
+    if 0 in levels and chain.limits is not None:  # the original is not among them
+        near_m = chain.limits.span(chain.display).nearest_m
+        levels[0] = replace(levels[0], near_distance_m=near_m)
     with ExitStack() as stack:
         original = stack.enter_context(PlantBuffers(plant))
         light, shadows = Light(), None
@@ -40,14 +43,15 @@ def contact_sheet(chain: LodChain) -> bytes:
             sun = Sun(chain.baked["azimuth_deg"], chain.baked["elevation_deg"])
             light, shadows = sun.light, stack.enter_context(SunMaps([original], sun.direction))
         cells = []
-        for level in levels:
+        for level in levels.values():
             camera = framed(plant.center, plant.radius, VIEW, level.near_distance_m, chain.display)
             with uploaded(level) as buffers:
                 above = truth(original, camera, light, 4, shadows)
                 cells.append(_cropped(above, live(buffers, camera, light)))
     width = MARGIN + len(levels) * (CELL + MARGIN)
-    captions = [_caption(level, number) for number, level in enumerate(levels, start=1)]
-    height = 2 * (CELL + MARGIN) + MARGIN + LINE * max(map(len, captions)) + 38
+    width = max(width, CELL)
+    captions = [_caption(level, number) for number, level in levels.items()]
+    height = 2 * (CELL + MARGIN) + MARGIN + LINE * max(map(len, captions), default=0) + 38
     sheet = Image.new("RGB", (width, height), PAPER)
     pen = ImageDraw.Draw(sheet)
     title, small = ImageFont.load_default(18), ImageFont.load_default(13)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from enum import Enum
-from math import exp, floor, log, log10, sqrt
+from math import exp, floor, inf, log, log10, sqrt
 
 import numpy as np
 
@@ -42,20 +42,22 @@ def switch_distances(
     limit: FloatArray,
     least_m: Sequence[float] | None = None,
     holds: Callable[[int, float], bool] = lambda level, distance: True,
+    farthest_m: float = inf,
 ) -> tuple[float | LeftOut, ...]:
     """The distance, metres, from which each level may be used, or why it has none.
 
     distance_m: (d,) increasing, where was measured. errors: per level, finest first, (d,). limit:
     (d,). least_m: metres per level below which it is not used, whatever its error. holds: whether
     a level keeps to the limit at a distance between those measured; where it does not, one halfway
-    to the next measured is asked for, and then that one taken.
+    to the next measured is asked for, and then that one taken. farthest_m: beyond, no level is
+    shown, and none needs to keep to a limit.
 
     Between measured distances, errors and limits are taken to be linear in the logarithm of
     distance. The last distance stands for all beyond. Distances are rounded up to three digits,
     and increase by more than a fade from each level to the next.
     """
     found: list[float | LeftOut] = []
-    until, next_m = float(distance_m[-1]), np.inf
+    until, next_m = max(float(distance_m[0]), min(float(distance_m[-1]), farthest_m)), np.inf
     for level in reversed(range(len(errors))):
         start = _start(distance_m, errors[level] - limit, until)
         if start is None:
@@ -101,3 +103,11 @@ def rounded_up(metres: float) -> float:
     nearest = round(scaled)
     whole = nearest if abs(scaled - nearest) < 1e-9 * scaled else floor(scaled) + 1
     return float(round(whole / 10.0**places, max(places, 0)))
+
+
+def rounded_down(metres: float) -> float:
+    """To three digits; 0 stays."""
+    if metres <= 0:
+        return 0.0
+    places = DIGITS - 1 - floor(log10(metres))
+    return float(round(floor(metres * 10.0**places) / 10.0**places, max(places, 0)))

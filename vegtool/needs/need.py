@@ -135,7 +135,7 @@ def needs_of(
 def ball_of(species: Species) -> tuple[float, float]:
     """Metres, at scale 1: how high above its foot the middle of a plant is, and the radius of the
     ball about it that holds all of the original."""
-    low, high = species.bounds[0]
+    low, high = species.original_bounds
     side = np.abs(np.stack([low, high])).max(axis=0)
     half = float(high[1] - low[1]) / 2
     return float(low[1] + high[1]) / 2, float(np.hypot(np.hypot(side[0], side[2]), half))
@@ -202,7 +202,7 @@ def _add(
 
 
 def _need(one: Species, found: _Known, display: Display, lit: Lit, sun: Sun | None) -> Need:
-    low, high = one.bounds[0]
+    low, high = one.original_bounds
     size_px = float((high - low).max()) * display.pixels_per_metre(1.0)
     if not found.plants:
         none = (0.0, 0.0)

@@ -109,8 +109,8 @@ def kinds_of(
     surfels = np.full(len(species), -1, np.int32)
     center, radius, thinned = (np.zeros(len(species)) for _ in range(3))
     for i, one in enumerate(species):
-        n, plant = len(one.levels), one.levels[0]
-        reach = plant.extent * focal_px
+        n = len(one.levels)
+        reach = one.extent * focal_px
         triangles[i, :n] = [len(e.faces) for e in elements[i]]
         switch[i, :n] = one.switch_m * focal_px / one.focal_px
         room[i, :n] = reach / side_of(triangles[i, :n])
@@ -121,12 +121,13 @@ def kinds_of(
         opaque[i, :n] = [
             all(m.alpha_mode == "opaque" for m in level.materials) for level in one.levels
         ]
+        opaque[i, 0] |= one.whole  # of the original, elements are leaves
         if one.surfels is not None:
             surfels[i], triangles[i, n] = n, triangles[i, 0]
             # discs of twice the size are for half the distance
             room[i, n] = switch[i, n] = one.surfels.switch_m * focal_px / one.focal_px
             fade[i, n], opaque[i, n] = one.surfels.fade, True
-        low, high = plant.bounds
+        low, high = one.original_bounds
         center[i] = (low[1] + high[1]) / 2
         side = np.abs(np.stack([low, high])).max(axis=0)
         radius[i] = float(np.hypot(np.hypot(side[0], side[2]), (high[1] - low[1]) / 2))
@@ -326,7 +327,7 @@ def chosen(
         side = sides_of(found.place, found.rows["turn"])
         enlarged *= _lengths(kinds, kind, at.stage(kind, away), side)[of]
     shown, solid = np.full(len(of), 2.0), np.ones(len(of))
-    by_elements = kinds.opaque[kind[of], drawn] | (drawn == 0)
+    by_elements = kinds.opaque[kind[of], drawn]
     fading = np.concatenate([share < 1, np.ones(len(fades), bool)])
     if mode == "dither":
         shown = np.where(fading, np.where(leaves, -comes - 1e-6, comes), shown)

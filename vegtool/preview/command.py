@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -114,7 +114,12 @@ def run_preview(
 
             world = read_surfel_world(wanted.path, options.pixels[1])
         else:
-            world = read_world(folder, file, read, part(progress, 0.0, READING))
+            from vegtool.preview.lacking import notes_on_limits
+
+            plants = read_world(folder, file, read, part(progress, 0.0, READING))
+            fov = min([plants.start.fov_y_deg, *([] if path is None else [path.fov_y_deg])])
+            lacks = notes_on_limits(plants, scene, way, options.pixels[1], fov)
+            world = replace(plants, notes=(*plants.notes, *lacks))
         _tell(world, options, say)
         from vegtool.preview.drawn import drawn_without_window, shown_in_window
 

@@ -176,7 +176,7 @@ def read_world(
 
 def _row(species: Sequence[Species]) -> World:
     species = [placed(one)[0] for one in species]
-    low, high = (np.array([one.levels[0].bounds[i] for one in species]) for i in (0, 1))
+    low, high = (np.array([one.original_bounds[i] for one in species]) for i in (0, 1))
     row = in_a_row(low, high)
     return World(
         tuple(species), Row(row.foot, row.width), row.terrain, row.ground, row.start, row.target
@@ -288,7 +288,7 @@ def _start(
 
 def _sizes(species: Sequence[Species]) -> tuple[FloatArray, FloatArray]:
     """(s,) metres each: heights, and how far crowns reach to the side."""
-    sizes = np.array([np.ptp(one.levels[0].bounds, axis=0) for one in species])
+    sizes = np.array([np.ptp(one.original_bounds, axis=0) for one in species])
     return np.array([one.height for one in species]), sizes[:, [0, 2]].max(axis=1) / 2
 
 

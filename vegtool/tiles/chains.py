@@ -36,6 +36,7 @@ from vegtool.options import check_limits
 from vegtool.progress import Progress, silent
 from vegtool.tiles.cache import filling, place_of
 from vegtool.tiles.library import Species, Stored, stored_species
+from vegtool.tiles.limits import without_original
 from vegtool.tiles.named import Source, stem
 from vegtool.tiles.species import check_height, shift_of
 
@@ -149,13 +150,14 @@ def _following(source: Source, library: Path) -> Work | None:
     if last["triangles"] <= FEW:
         return None
     read, how, measure = _options(source.path, told)
-    if len(base.levels) == 1:
+    alone = len(base.levels) == 1 and base.whole
+    if alone:
         how = replace(how, levels=LEVELS)
         if how.method == SURFELS:  # tiles are merged of triangles
             how = ConvertOptions(levels=LEVELS, fov=how.fov, image_height=how.image_height)
     else:
         planes = max(1, last["triangles"] // (LEVEL_RATIO * TRIANGLES_PER_BILLBOARD))
-        seen = Display(how.fov, how.image_height).pixels_per_metre(last["switch_distance_m"])
+        seen = Display(how.fov, how.image_height).pixels_per_metre(_last_from(base))
         pixels = float(np.clip(told["extent_m"] * seen / LEVEL_RATIO, *NEAR_LIMITS))
         levels = max(1, int(log2(planes)))
         how = replace(how, billboards=planes, pixels=pixels, levels=min(levels, LEVELS))
@@ -168,16 +170,17 @@ def _coarser(work: Work, progress: Progress) -> LodChain:
     base, told = stored_species(work.source.path), read_manifest(work.source.path)
     last = told["levels"][len(base.levels) - 1]
     plant = read_plant(base.files[0], work.read)
-    notes = list[str]()
+    notes = without_original(base)
     try:
         chain = convert(plant, work.convert, work.measure, progress)
     except QualityError as error:
         notes.append(str(error))
         chain = LodChain(work.name, (), work.convert.display, work.convert.seed)
-    triangles, after_m = last["triangles"], float(base.switch_m[-1])
+    triangles, after_m = last["triangles"], _last_from(base)
+    alone = len(base.levels) == 1 and base.whole
     levels = [Level("mesh", mesh=base.levels[-1])]
     for level in chain.levels[1:]:
-        lit_alike = len(base.levels) == 1 or level.unlit == last.get("unlit", False)
+        lit_alike = alone or level.unlit == last.get("unlit", False)
         if level.triangles <= MOST_OF_PREVIOUS * triangles and lit_alike:
             least_m = rounded_up((1 + FADE_FRACTION) * after_m)
             if level.near_distance_m < least_m:
@@ -189,6 +192,15 @@ def _coarser(work: Work, progress: Progress) -> LodChain:
         chain, name=work.name, levels=tuple(levels), options=options, notes=tuple(notes),
         shadow=None,
     )  # fmt: skip
+
+
+def _last_from(base: Species) -> float:
+    """Metres from which on the last level is drawn; where that is all there is for the eyes of a
+    scene, from the nearest one on."""
+    if len(base.levels) > 1 or base.whole or base.limits is None:
+        return float(base.switch_m[-1])
+    ratio = base.focal_px / base.limits.display.pixels_per_metre(1.0)
+    return base.limits.nearest_m * ratio
 
 
 def _work(

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import inf
 from pathlib import Path
-from typing import overload
+from typing import Any, overload
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from vegtool.formats import READERS, ReadOptions, read_plant
 from vegtool.formats.beside import find_beside
 from vegtool.formats.gltf_surfels import read_surfel_set
 from vegtool.formats.manifest import read_manifest
+from vegtool.limits import Limits
 from vegtool.lod import FADE_FRACTION, Display
 from vegtool.plant import Plant
 from vegtool.progress import Progress, silent
@@ -73,6 +75,21 @@ def moved(plant: Plant, shift: FloatArray) -> Plant:
 
 
 @dataclass(frozen=True, eq=False)
+class MadeFor:
+    """Of levels that are for the eyes of a scene alone.
+
+    bounds: (2, 3) metres of the original. original: whether that is the first of the levels.
+    manifest: which says so. left_out: what is missing of what any eye would need.
+    """
+
+    limits: Limits
+    bounds: FloatArray
+    original: bool
+    manifest: Path
+    left_out: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
 class Species:
     """A plant and its levels, as files give them.
 
@@ -93,6 +110,7 @@ class Species:
     files: tuple[Path, ...]
     error_m: FloatArray = field(default_factory=lambda: np.empty(0))
     surfels: StoredSurfels | None = None
+    made_for: MadeFor | None = None
 
     def __post_init__(self) -> None:
         count = len(self.levels)
@@ -128,14 +146,48 @@ class Species:
         return self._outline[1]
 
     @property
+    def limits(self) -> Limits | None:
+        """The eyes that the levels are for; None for any."""
+        return None if self.made_for is None else self.made_for.limits
+
+    @property
+    def whole(self) -> bool:
+        """Whether the first level is the original."""
+        return self.made_for is None or self.made_for.original
+
+    @property
+    def original_bounds(self) -> FloatArray:
+        """(2, 3) metres: of the original, whether it is among the levels or not."""
+        return self.bounds[0] if self.made_for is None else self.made_for.bounds
+
+    @property
+    def extent(self) -> float:
+        """Metres: the longest side of the original."""
+        return float(np.ptp(self.original_bounds, axis=0).max())
+
+    @property
     def height(self) -> float:
         """Metres, of the original above its foot."""
-        return float(self.bounds[0, 1, 1])
+        return float(self.original_bounds[1, 1])
 
     @property
     def size(self) -> float:
         """Metres: nothing of the original is farther from its foot."""
-        return float(np.linalg.norm(np.abs(self.bounds[0]).max(axis=0)))
+        return float(np.linalg.norm(np.abs(self.original_bounds).max(axis=0)))
+
+    def moved(self, shift: FloatArray) -> Species:
+        """The plant elsewhere, by (3,) metres."""
+        levels: Sequence[Plant]
+        x, y, z = shift.tolist()
+        surfels = None if self.surfels is None else replace(self.surfels, shift=(x, y, z))
+        made_for = self.made_for
+        if made_for is not None:
+            made_for = replace(made_for, bounds=made_for.bounds + shift)
+        if isinstance(self.levels, Stored):
+            levels = replace(self.levels, shift=(x, y, z))
+        else:
+            levels = tuple(moved(level, shift) for level in self.levels)
+        return replace(self, levels=levels, surfels=surfels, made_for=made_for)
 
 
 def read_library(path: Path, read: ReadOptions, progress: Progress = silent) -> list[Species]:
@@ -222,5 +274,26 @@ def stored_species(path: Path) -> Species:
     stored = Stored(tuple(files[:count]))
     return Species(
         told["name"], stored, distances[:count], fade[:count], focal, stored.files, error[:count],
-        surfels,
+        surfels, _made_for(path, told),
     )  # fmt: skip
+
+
+def _made_for(manifest: Path, told: dict[str, Any]) -> MadeFor | None:
+    """The eyes that the levels of a manifest are for; None for any."""
+    if "scene" not in told:
+        return None
+    scene = told["scene"]
+    farthest, azimuth, elevation = scene["farthest_m"], scene["azimuth_deg"], scene["elevation_deg"]
+    limits = Limits(
+        scene["digest"], scene["nearest_m"], inf if farthest is None else farthest,
+        (azimuth["start"], azimuth["extent"]), (elevation["low"], elevation["high"]),
+        Display(scene["fov_y_deg"], scene["image_height_px"]),
+    )  # fmt: skip
+    bounds = np.array(scene["bounds_m"], np.float64)
+    if bounds.shape != (2, 3) or (bounds[0] > bounds[1]).any():
+        raise InputError(
+            f"{manifest}: scene.bounds_m: expected the least and the greatest corner, (x, y, z) "
+            f"each, found {scene['bounds_m']!r:.60}. Convert the plant again."
+        )
+    left_out = tuple(one["what"] for one in scene["left_out"])
+    return MadeFor(limits, bounds, scene["original"], manifest, left_out)

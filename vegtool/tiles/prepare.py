@@ -66,7 +66,7 @@ def prepare(
         progress(f"plants: {source.path.name}", done)
         one = joined(_manifests(source, works[source]))
         one, away = placed(replace(one, name=scene.species[int(index)].name or one.name))
-        check_height(source.path, one.bounds[0])
+        check_height(source.path, one.original_bounds)
         if away:
             notes.append(note_on_place(source.path, away))
         species.append(one)

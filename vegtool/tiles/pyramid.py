@@ -23,6 +23,7 @@ from vegtool.scene import Scene
 from vegtool.tiles.georeference import earth_from_scene, notes_on
 from vegtool.tiles.levels import level_at, switches, triangles
 from vegtool.tiles.library import Species
+from vegtool.tiles.limits import of_any_eye, without_original
 from vegtool.tiles.options import TileOptions
 from vegtool.tiles.placement import Placement, placement_of
 from vegtool.tiles.prepare import prepare
@@ -210,8 +211,12 @@ def pyramid_of(
         folder = folder_of(library)
         samples = samples_of(found.species, folder, workers, lambda s, f: progress(s, 1.0))
     tree = quadtree_of(placement.tiles, placement.tile_m, _above(placement, options))
-    notes = (*terrain.notes, *placement.notes, *notes_on(terrain, placement), *found.notes)
-    return Pyramid(placement, found.species, tree, options, Display(), notes, samples)
+    display = Display()
+    lacks = of_any_eye(found.species, display.pixels_per_metre(1.0), scene)
+    if options.surfels:
+        lacks += [note for one in found.species for note in without_original(one)]
+    notes = (*terrain.notes, *placement.notes, *notes_on(terrain, placement), *found.notes, *lacks)
+    return Pyramid(placement, found.species, tree, options, display, notes, samples)
 
 
 def _above(placement: Placement, options: TileOptions) -> int:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +10,9 @@ import numpy as np
 from vegtool.arrays import FloatArray
 from vegtool.errors import InputError, UsageError
 from vegtool.formats import ReadOptions
-from vegtool.plant import Plant
 from vegtool.progress import Progress, silent
 from vegtool.scene import Scene
-from vegtool.tiles.library import MANIFEST, Species, Stored, moved, read_library
+from vegtool.tiles.library import MANIFEST, Species, read_library
 from vegtool.tiles.named import TABLES, Library, Source, library_at, plant_at
 
 ROOTED, BESIDE = 0.1, 1.0
@@ -49,7 +47,7 @@ def species_of(scene: Scene, folder: Path, read: ReadOptions, progress: Progress
         progress(f"plants: {table.name or path.name}", len(species) / len(sources))
         (one,) = read_library(path, read if usual else source.read)
         stands, away = placed(one)
-        check_height(path, stands.bounds[0])
+        check_height(path, stands.original_bounds)
         species.append(stands)
         if not source.converted:
             notes.append(f"{path}: has no levels of detail; vegtool convert makes them")
@@ -131,17 +129,10 @@ def placed(one: Species) -> tuple[Species, float]:
 
     One that is about there already is as it was: a crown may lean, and roots go into the ground.
     """
-    shift = shift_of(one.bounds[0])
+    shift = shift_of(one.original_bounds)
     if not shift.any():
         return one, 0.0
-    levels: Sequence[Plant]
-    x, y, z = shift.tolist()
-    surfels = None if one.surfels is None else replace(one.surfels, shift=(x, y, z))
-    if isinstance(one.levels, Stored):
-        levels = replace(one.levels, shift=(x, y, z))
-    else:
-        levels = tuple(moved(level, shift) for level in one.levels)
-    return replace(one, levels=levels, surfels=surfels), float(np.linalg.norm(shift))
+    return one.moved(shift), float(np.linalg.norm(shift))
 
 
 def shift_of(bounds: FloatArray) -> FloatArray:
