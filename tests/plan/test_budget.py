@@ -31,15 +31,20 @@ def test_a_level_that_is_left_out_is_replaced_by_the_one_before_or_the_first() -
     assert by_set[False, True, True] == pytest.approx(0.9 + 0.2 + 0.05)
     # the original alone is drawn everywhere; with the last, that one far away
     assert by_set[True, False, True] == pytest.approx(0.1 + 0.1 + 0.05)
-    assert len(found) == 3 and found.bytes.tolist() == [1, 11, 101]
+    assert found.bytes.tolist() == [1, 11, 100, 101]
+    assert found.bytes[found.hull].tolist() == [1, 11, 101]
 
 
 def test_choices_are_a_convex_hull_that_all_sets_lie_above() -> None:
     for seed in range(20):
         found = plant(seed)
         assert (np.diff(found.bytes) > 0).all() and (np.diff(found.error) < 0).all()
-        slopes = np.diff(found.error) / np.diff(found.bytes)
-        assert (np.diff(slopes) >= 0).all()
+        size, error = found.bytes[found.hull], found.error[found.hull]
+        slopes = np.diff(error) / np.diff(size)
+        assert (
+            (np.diff(slopes) >= 0).all() and found.hull[0] == 0 and found.hull[-1] == len(found) - 1
+        )
+        assert (np.interp(found.bytes, size, error) <= found.error + 1e-12).all()
 
 
 def test_no_way_to_spend_a_budget_is_better_by_more_than_a_step() -> None:
@@ -58,10 +63,7 @@ def test_no_way_to_spend_a_budget_is_better_by_more_than_a_step() -> None:
                 for rows in product(*(range(len(one)) for one in some))
                 if sum(int(one.bytes[i]) for one, i in zip(some, rows, strict=True)) <= budget
             )
-            step = max(
-                (one.error[i] - one.error[i + 1] for one, i in zip(some, made, strict=True)
-                 if i + 1 < len(one)), default=0.0,
-            )  # fmt: skip
+            step = max(-np.diff(one.error[one.hull]).min(initial=0.0) for one in some)
             assert spent <= budget and error <= best + step + 1e-12
         assert spread(some, most).tolist() == [len(one) - 1 for one in some]
 

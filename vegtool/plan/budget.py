@@ -1,9 +1,10 @@
 """Bytes spread over species where they gain most: by seen error for each byte, not evenly.
 
 Everett: Generalized Lagrange multiplier method for solving problems of optimum allocation of
-resources (1963). Of all that can be kept of a species only what lies on the lower convex hull of
-bytes and error counts; steps along the hulls, taken in the order of what each gains per byte,
-spend any budget as well as can be, but for the last step.
+resources (1963). Of all that can be kept of a species what lies on the lower convex hull of bytes
+and error is looked at first; steps along the hulls, taken in the order of what each gains per byte,
+spend any budget as well as can be, but for the last step. What that leaves goes to whatever else
+fits and gains most.
 """
 
 from __future__ import annotations
@@ -24,16 +25,17 @@ MOST_LEVELS = 16
 
 @dataclass(frozen=True, eq=False)
 class Choices:
-    """What may be kept of a species, dearer and dearer, each with less error per byte than the
-    last.
+    """What may be kept of a species, dearer and dearer, each with less error than the last.
 
     kept: (m, n) bool, of its n levels. bytes: (m,) int64, ascending. error: (m,) seen error,
-    descending: of all pixels that are seen of the species, their error added up.
+    descending: of all pixels that are seen of the species, their error added up. hull: (h,) int32
+    those that lie on the lower convex hull, the first and the last among them.
     """
 
     kept: BoolArray
     bytes: IntArray
     error: FloatArray
+    hull: IntArray
 
     def __len__(self) -> int:
         return len(self.bytes)
@@ -64,17 +66,16 @@ def choices(
         drawn = np.where(sets[:, level, None] & (start[level] <= at), level, drawn)
     seen = (wrong[drawn, np.arange(len(at))] * weight).sum(axis=1)
     total = sets @ size
-    row = _hull(total, seen)
-    return Choices(sets[row], total[row], seen[row])
+    order = np.lexsort((seen, total))
+    better = np.minimum.accumulate(seen[order])
+    row = order[np.diff(better, prepend=np.inf) < 0]  # nothing that costs less errs less
+    return Choices(sets[row], total[row], seen[row], _hull(total[row], seen[row]))
 
 
 def _hull(size: IntArray, error: FloatArray) -> IntArray:
-    """Rows of the lower convex hull, from the cheapest to the one with the least error."""
-    order = np.lexsort((error, size))
+    """Rows of the lower convex hull of what costs more and more, and errs less and less."""
     found: list[int] = []
-    for row in order.tolist():
-        if found and error[row] >= error[found[-1]]:
-            continue
+    for row in range(len(size)):
         while len(found) > 1 and _slope(size, error, found[-2], found[-1]) >= _slope(
             size, error, found[-1], row
         ):
@@ -95,23 +96,29 @@ def spread(some: Sequence[Choices], budget: int) -> IntArray:
     """
     left = budget - _least(some, budget)
     steps = [
-        (_gain(one, before), species, after)
+        (_slope(one.bytes, one.error, before, after), species, before, after)
         for species, one in enumerate(some)
-        for before, after in pairwise(range(len(one)))
+        for before, after in pairwise(one.hull.tolist())
     ]
     made = np.zeros(len(some), np.int32)
-    for _, species, after in sorted(steps, key=lambda step: (-step[0], step[1], step[2])):
-        cost = int(some[species].bytes[after] - some[species].bytes[after - 1])
-        if made[species] == after - 1 and cost <= left:
+    for _, species, before, after in sorted(steps):
+        cost = int(some[species].bytes[after] - some[species].bytes[before])
+        if made[species] == before and cost <= left:
             made[species], left = after, left - cost
-    return made
+    while True:
+        gains = [_fitting(one, int(at), left) for one, at in zip(some, made, strict=True)]
+        species = int(np.argmax([gain for gain, _ in gains]))
+        if not gains[species][0] > 0:
+            return made
+        after = gains[species][1]
+        left -= int(some[species].bytes[after] - some[species].bytes[made[species]])
+        made[species] = after
 
 
-def _gain(one: Choices, before: int) -> float:
-    """Of the step to the next choice, per byte."""
-    return float(one.error[before] - one.error[before + 1]) / float(
-        one.bytes[before + 1] - one.bytes[before]
-    )
+def _fitting(one: Choices, at: int, left: int) -> tuple[float, int]:
+    """What the best choice that so many more bytes pay for gains, and which it is."""
+    after = int(np.searchsorted(one.bytes, one.bytes[at] + left, "right")) - 1
+    return float(one.error[at] - one.error[after]), after
 
 
 def _least(some: Sequence[Choices], budget: int) -> int:

@@ -60,6 +60,8 @@ class Spent:
         return asdict(self)
 
 
+NOTHING = Choices(np.zeros((1, 0), bool), np.zeros(1, np.int64), np.zeros(1), np.zeros(1, np.int32))
+"""Of what nobody sees."""
 SHARES = (0.05, 0.1, 0.15, 0.25, 0.35, 0.5, 0.75, 1.0)
 """Of the bytes of all that is needed, at which the curve is told."""
 
@@ -92,7 +94,7 @@ def spent(
         said = part_of(progress, index / len(species), 1 / len(species))
         rows = np.flatnonzero(levels_needed(one, need).kept)
         if not len(rows):
-            some.append(Choices(np.zeros((1, 0), bool), np.zeros(1, np.int64), np.zeros(1)))
+            some.append(NOTHING)
             known.append(rows)
             continue
         kind = "ground" if need.elevation[1] < np.radians(30) else "all"
