@@ -49,6 +49,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "batch": {"convert", "formats", "measure", "workers"},
     "scene": {"convert", "lighting"},
     "camera_path": {"scene"},
+    "plan": {"console", "formats", "gl", "measure", "needs", "scene", "tiles"},
     "needs": {"camera_path", "formats", "lighting", "scene", "tiles"},
     "preview": {
         "camera_path", "elements", "formats", "gl", "lighting", "measure", "needs", "scene",
@@ -70,7 +71,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "__main__": {"cli"},
     "cli": {
         "batch", "console", "convert", "doctor", "flags", "formats", "growth", "inspect",
-        "measure", "needs", "outcomes", "preview", "report", "scene", "stability", "tiles",
+        "measure", "needs", "outcomes", "plan", "preview", "report", "scene", "stability", "tiles",
     },
 }  # fmt: skip
 

@@ -31,7 +31,7 @@ def test_a_level_that_is_left_out_is_replaced_by_the_one_before_or_the_first() -
     assert by_set[False, True, True] == pytest.approx(0.9 + 0.2 + 0.05)
     # the original alone is drawn everywhere; with the last, that one far away
     assert by_set[True, False, True] == pytest.approx(0.1 + 0.1 + 0.05)
-    assert found.bytes.tolist() == [1, 11, 100, 101]
+    assert found.bytes.tolist() == [1, 10, 11, 100, 101]
     assert found.bytes[found.hull].tolist() == [1, 11, 101]
 
 
