@@ -101,4 +101,4 @@ def test_a_budget_is_spent_or_refused_with_its_line(
     assert isinstance(spent, dict) and spent["kept"][0]["levels"] == [2]
     path.write_text(path.read_text("utf-8").replace("1000000", "1"), "utf-8")
     assert run(["plan", str(path), "--species", str(tmp_path)]) == 2
-    assert "scene.toml, line 12" in capsys.readouterr().err
+    assert "scene.toml, line 11" in capsys.readouterr().err
