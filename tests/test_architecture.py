@@ -48,8 +48,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "camera_path": {"scene"},
     "needs": {"camera_path", "formats", "lighting", "scene", "tiles"},
     "preview": {
-        "camera_path", "elements", "formats", "gl", "lighting", "measure", "scene", "surfels",
-        "tiles",
+        "camera_path", "elements", "formats", "gl", "lighting", "measure", "needs", "scene",
+        "surfels", "tiles",
     },
     "stability": {
         "branches", "clustering", "boxes", "gl", "lighting", "baking", "measure", "refine",

@@ -78,7 +78,7 @@ def run_preview(
     if wanted.html is not None:
         with bar("preview"):
             return _write_page(wanted)
-    from vegtool.preview.tile_world import read_tile_world
+    from vegtool.preview.tile_world import TileWorld, read_tile_world
     from vegtool.preview.world import parts_of, read_world, way_of
 
     tiles = tileset_at(wanted.path)
@@ -114,9 +114,11 @@ def run_preview(
             world = read_surfel_world(wanted.path, options.pixels[1])
         else:
             world = read_world(folder, file, read, part(progress, 0.0, READING))
-        _tell(world, options, say)
-        from vegtool.preview.drawn import drawn_without_window, shown_in_window
+        from vegtool.preview.drawn import drawn_without_window, eyes_of, shown_in_window
 
+        if isinstance(world, TileWorld):
+            world = world.told_of(eyes_of(world, path), options.pixels[1])
+        _tell(world, options, say)
         if not wanted.window:
             drawn = part(progress, READING, 1.0)
             result = drawn_without_window(wanted, world, path, options, drawn)
