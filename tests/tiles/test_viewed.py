@@ -26,6 +26,7 @@ from vegtool.plant import Material, Texture
 from vegtool.preview.eye import Eye
 from vegtool.preview.scenery import Look
 from vegtool.preview.tile_forest import TileForest
+from vegtool.preview.tile_world import read_tile_world
 from vegtool.preview.tileset import read_tileset
 from vegtool.seeding import generator
 from vegtool.tiles.jobs import Made, World, file_of
@@ -204,6 +205,32 @@ def test_viewers_that_may_be_anywhere_get_all_tiles(full: Full, tmp_path: Path) 
     root, every = root_of(tmp_path / "out"), root_of(out)
     assert root["extras"].pop("scene")["plants"] == 304
     assert root == every
+
+
+@pytest.mark.gl
+def test_a_client_sees_the_same_picture(full: Full, tmp_path: Path) -> None:
+    """To the bit, at eyes of the description."""
+    made, out = full
+    camera = "polygon = [[-30, 10], [-10, 10], [-10, 30]]\nheight_m = [1.5, 2]\n"
+    seen = view(tmp_path, made, f"{camera}image_height_px = 96\n")
+    viewed(made, seen, tmp_path / "out")
+    assert tiles(tmp_path / "out").items() < tiles(out).items()
+    eyes = inside(seen.viewers, 4, 2)
+    pictures = []
+    for folder in (out, tmp_path / "out"):
+        forest = read_tile_world(folder / "tileset.json").scenery("alpha-test")
+        for _ in forest.load():
+            pass
+        pictures.append(
+            [
+                forest.picture(Eye(place, float(yaw)), (128, 96))
+                for place, yaw in zip(eyes.position, eyes.yaw_deg, strict=True)
+            ]
+        )
+        forest.release()
+    for whole, fewer in zip(*pictures, strict=True):
+        assert whole[..., :3].std() > 0.01
+        np.testing.assert_array_equal(whole, fewer)
 
 
 # ------------------------------------------------------------------------------------ once more

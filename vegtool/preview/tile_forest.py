@@ -94,7 +94,7 @@ class TileForest(OnGpu):
         said = [f"{drawn.surfels:,} surfels"] if drawn.surfels else []
         made = self.tileset.made_for
         if made is not None and made.is_outside(eye, size[1]):
-            said.append(f"not as {made.file} has it: tiles are missing")
+            said.append(f"not where {made.file} has eyes: tiles are missing")
         return FrameStats(
             len(tiles.tile), int(self.tileset.plants[tiles.tile[~tiles.below]].sum()), self.total,
             len(drawn_frame.rows) + len(drawn_frame.points),
