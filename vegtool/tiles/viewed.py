@@ -37,7 +37,6 @@ from vegtool.tiles.jobs import (
 )
 from vegtool.tiles.journal import Entry, appended
 from vegtool.tiles.needed import contents_of, hidden_by_ground, passed_over, pruned
-from vegtool.tiles.pyramid import PER_PLANT
 from vegtool.tiles.quadtree import Node, nodes_of
 from vegtool.tiles.run import COST, TREE, Each, Run, blocks, clean, models
 from vegtool.tiles.tree import tree_of
@@ -184,7 +183,7 @@ class ViewedRun(Run):
             return INSTANCE_BYTES * count
         if pyramid.options.surfels:
             return SURFEL_BYTES * pyramid.surfels_for(count * float(pyramid.of_level[:, 0].mean()))
-        return FAR_BYTES * min(pyramid.budget(node), PER_PLANT * count)
+        return FAR_BYTES * pyramid.budget(node)
 
     def _root(self) -> TileEntry | None:
         looked_at = {
