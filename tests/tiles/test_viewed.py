@@ -26,10 +26,11 @@ from vegtool.plant import Material, Texture
 from vegtool.preview.eye import Eye
 from vegtool.preview.scenery import Look
 from vegtool.preview.tile_forest import TileForest
+from vegtool.preview.tile_world import read_tile_world
 from vegtool.preview.tileset import read_tileset
 from vegtool.seeding import generator
 from vegtool.tiles.jobs import Made, World, file_of
-from vegtool.tiles.needed import contents_of, passed_over, pruned, reached_by
+from vegtool.tiles.needed import contents_of, hidden_by_ground, passed_over, pruned, reached_by
 from vegtool.tiles.options import TileOptions
 from vegtool.tiles.pyramid import Pyramid, pyramid_of
 from vegtool.tiles.quadtree import quadtree_of
@@ -204,6 +205,79 @@ def test_viewers_that_may_be_anywhere_get_all_tiles(full: Full, tmp_path: Path) 
     root, every = root_of(tmp_path / "out"), root_of(out)
     assert root["extras"].pop("scene")["plants"] == 304
     assert root == every
+
+
+@pytest.mark.gl
+def test_a_client_sees_the_same_picture(full: Full, tmp_path: Path) -> None:
+    """To the bit, at eyes of the description."""
+    made, out = full
+    camera = "polygon = [[-30, 10], [-10, 10], [-10, 30]]\nheight_m = [1.5, 2]\n"
+    seen = view(tmp_path, made, f"{camera}image_height_px = 96\n")
+    viewed(made, seen, tmp_path / "out")
+    assert tiles(tmp_path / "out").items() < tiles(out).items()
+    eyes = inside(seen.viewers, 4, 2)
+    pictures = []
+    for folder in (out, tmp_path / "out"):
+        forest = read_tile_world(folder / "tileset.json").scenery("alpha-test")
+        for _ in forest.load():
+            pass
+        pictures.append(
+            [
+                forest.picture(Eye(place, float(yaw)), (128, 96))
+                for place, yaw in zip(eyes.position, eyes.yaw_deg, strict=True)
+            ]
+        )
+        forest.release()
+    for whole, fewer in zip(*pictures, strict=True):
+        assert whole[..., :3].std() > 0.01
+        np.testing.assert_array_equal(whole, fewer)
+
+
+@dataclass(frozen=True, eq=False)
+class Behind:
+    """A view of whose squares those are hidden that lie beyond an x, metres."""
+
+    seen: SceneView
+    beyond: float
+    hills = True
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.seen, name)
+
+    def hidden(self, boxes: np.ndarray) -> np.ndarray:
+        return np.asarray(boxes[:, 0, 0] > self.beyond)
+
+
+def test_what_is_hidden_is_left_out(full: Full, tmp_path: Path) -> None:
+    """Of what a client draws, the squares behind are missing, and nothing else; those that are in
+    part before the ground are there."""
+    made, out = full
+    seen = view(tmp_path, made, *CAMERAS["a lawn"])
+    behind = Behind(seen, 20.0)
+    run, _ = viewed(made, behind, tmp_path / "out")  # type: ignore[arg-type]
+    gone = {file_of(node) for node in hidden_by_ground(made, behind)}  # type: ignore[arg-type]
+    assert gone and all(
+        (made.bounds(node)[0, 0] > 20) == (file_of(node) in gone)
+        for level in (made.tree.depth, made.tree.depth - 1)
+        for node in made.tree.nodes(level)
+    )
+    assert sum(row["hidden"] for row in run.left_out()) == len(gone)
+    eyes = inside(seen.viewers, 60, 7)
+    clients = Client(out), Client(tmp_path / "out")
+    names = {Path(name).name for name in gone}
+    missed = 0
+    for place, yaw in zip(eyes.position, eyes.yaw_deg, strict=True):
+        wanted, got = (client.draws(Eye(place, float(yaw)), (1440, 1080)) for client in clients)
+        left = [one for one in wanted if one[0] not in names]
+        missed += len(wanted) - len(left)
+        assert left == got
+    assert missed
+
+
+def test_where_all_is_hidden_something_is_shown(full: Full, tmp_path: Path) -> None:
+    seen = view(tmp_path, full[0], *CAMERAS["afar"])
+    run, _ = viewed(full[0], Behind(seen, -1e9), tmp_path / "out")  # type: ignore[arg-type]
+    assert run.kept
 
 
 # ------------------------------------------------------------------------------------ once more
@@ -430,7 +504,7 @@ def test_what_is_left_out_is_said(
     for row in facts["scene"]["left_out"]:
         (level,) = (one for one in planned["levels"] if one["height"] == row["height"])
         assert (level["tiles"], level["too_near"]) == (row["kept"], row["too_near"])
-        assert row["squares"] == row["kept"] + row["too_near"] + row["too_far"]
+        assert row["squares"] == sum(row[k] for k in ("kept", "too_near", "hidden", "too_far"))
     assert main(["tiles", *sources, *out, *options]) == 0
     assert "eyes too far" in capsys.readouterr().out
 

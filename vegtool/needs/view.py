@@ -16,6 +16,7 @@ from vegtool.arrays import FloatArray
 from vegtool.errors import UsageError
 from vegtool.formats.tileset import CLIENT_PX
 from vegtool.lod import Display
+from vegtool.needs.hidden import hidden
 from vegtool.needs.planar import BoolArray
 from vegtool.needs.tiles import refined
 from vegtool.needs.viewers import PAIRS, Viewers, display_of, viewers_of
@@ -86,6 +87,15 @@ class SceneView:
         far = farthest_from_boxes(self.viewers, boxes)
         seen = (1 - SLACK) * error_m * self.display.pixels_per_metre(1.0)
         return np.asarray(seen > CLIENT_PX * far)
+
+    @property
+    def hills(self) -> bool:
+        """Whether there is anything that hides."""
+        return self.viewers.floor.terrain.grid is not None
+
+    def hidden(self, boxes: FloatArray) -> BoolArray:
+        """(n,) whether the ground is before all of a box, for every eye."""
+        return hidden(boxes, self.viewers)
 
     def pixels_per_metre(self, boxes: FloatArray) -> FloatArray:
         """(n,) pixels that no metre in a box is more than; infinite where an eye may be in it."""

@@ -106,9 +106,11 @@ def run_preview(
     with bar("preview") as progress:
         world: Place
         if tiles is not None:
+            from vegtool.preview.drawn import eyes_of
             from vegtool.preview.tile_world import read_tile_world
 
-            world = read_tile_world(tiles)
+            squares = read_tile_world(tiles)
+            world = squares.told_of(eyes_of(squares, path), options.pixels[1])
         elif surfels:
             from vegtool.preview.surfel_world import read_surfel_world
 
@@ -120,9 +122,9 @@ def run_preview(
             fov = min([plants.start.fov_y_deg, *([] if path is None else [path.fov_y_deg])])
             lacks = notes_on_limits(plants, scene, way, options.pixels[1], fov)
             world = replace(plants, notes=(*plants.notes, *lacks))
-        _tell(world, options, say)
         from vegtool.preview.drawn import drawn_without_window, shown_in_window
 
+        _tell(world, options, say)
         if not wanted.window:
             drawn = part(progress, READING, 1.0)
             result = drawn_without_window(wanted, world, path, options, drawn)

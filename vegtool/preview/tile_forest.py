@@ -91,11 +91,15 @@ class TileForest(OnGpu):
             "load": loaded - chosen,
             "draw": perf_counter() - loaded,
         }
+        said = [f"{drawn.surfels:,} surfels"] if drawn.surfels else []
+        made = self.tileset.made_for
+        if made is not None and made.is_outside(eye, size[1]):
+            said.append(f"not where {made.file} has eyes: tiles are missing")
         return FrameStats(
             len(tiles.tile), int(self.tileset.plants[tiles.tile[~tiles.below]].sum()), self.total,
             len(drawn_frame.rows) + len(drawn_frame.points),
             drawn.draws, drawn.triangles, drawn.samples // MSAA, look.detail, seconds,
-            (f"{drawn.surfels:,} surfels",) if drawn.surfels else (),
+            tuple(said),
         )  # fmt: skip
 
     def picture(

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from vegtool.arrays import FloatArray
+from vegtool.formats.tileset import TILESET
 from vegtool.gl.landscape import GroundMesh
 from vegtool.lighting.light import Sun
 from vegtool.preview.eye import Eye, towards
+from vegtool.preview.made_for import beyond
 from vegtool.preview.options import FadeMode
 from vegtool.preview.tile_forest import TileForest
 from vegtool.preview.tileset import Tileset, read_tileset
@@ -37,6 +40,13 @@ class TileWorld:
     sun: Sun | None = None
     way: Path | None = None
     orbited: bool = False
+    file: Path = Path(TILESET)
+
+    def told_of(self, eyes: Sequence[Eye], height_px: int) -> TileWorld:
+        """The same, with a note where it is not made for these eyes, in pictures of that height."""
+        made = self.tileset.made_for
+        notes = () if made is None else beyond(self.file, made, eyes, height_px)
+        return replace(self, notes=(*self.notes, *notes))
 
     @property
     def progressive(self) -> bool:
@@ -88,7 +98,7 @@ def read_tile_world(file: Path) -> TileWorld:
         ground = GroundMesh(np.zeros(3), *mesh)
     else:
         notes = (f"{file}: has no ground, which is for the client to show; none is drawn",)
-    return TileWorld(tiles, start, target, ground, notes)
+    return TileWorld(tiles, start, target, ground, notes, file=file)
 
 
 def _height(tiles: Tileset, xz: FloatArray) -> float:

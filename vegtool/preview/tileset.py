@@ -25,6 +25,7 @@ from vegtool.formats.gltf_data import GltfFile, open_gltf
 from vegtool.formats.gltf_tile import INSTANCING
 from vegtool.formats.tileset import CLIENT_PX
 from vegtool.plant import Plant
+from vegtool.preview.made_for import MadeFor, made_for
 
 LongArray = npt.NDArray[np.int64]
 
@@ -47,7 +48,7 @@ class Tileset:
     int64, the first of each, and the one after the last. plants: (t,) int64, that stand on each.
     feet_m: (t, 2), the lowest and highest of their feet. depth: (t,) int64, of each below the root.
     surfels: (t,) int64, that each is drawn as, 0 of others. seen_px: pixels that errors are to be
-    seen as.
+    seen as. made_for: whose tiles alone there are, or None.
     """
 
     file: tuple[str | None, ...]  # half a million paths would take seconds
@@ -61,6 +62,7 @@ class Tileset:
     depth: LongArray
     surfels: LongArray
     seen_px: float = CLIENT_PX
+    made_for: MadeFor | None = None
 
     @cached_property
     def shown(self) -> np.ndarray:
@@ -141,7 +143,7 @@ class _Outside:
 @dataclass(frozen=True, eq=False)
 class _Part:
     """The n tiles of one file. number: (n,) int64 among all. end: the number after those that they
-    and their children have. feet_m, seen_px: as told. Others as of Tileset."""
+    and their children have. feet_m, seen_px, made_for: as told. Others as of Tileset."""
 
     number: LongArray
     file: list[str | None]
@@ -157,6 +159,7 @@ class _Part:
     outside: list[_Outside]
     end: int
     seen_px: float
+    made_for: MadeFor | None
 
 
 def _part(at: _Outside, free: int) -> _Part:
@@ -206,6 +209,7 @@ def _tiles_of(at: _Outside, root: dict[str, Any], free: int) -> _Part:
     seen_px = float(root["extras"].get("seen_px", CLIENT_PX))
     if not 0 < seen_px < float("inf"):
         raise ValueError(f"errors to be seen as {seen_px:g} pixels")
+    scene = root["extras"].get("scene")
     boxes = _numbers([tile["boundingVolume"]["box"] for tile, _, _ in shown], 12)
     origins = _numbers([origin for _, _, origin in shown], 3)
     center = origins + boxes[:, [0, 2, 1]] * [1, 1, -1]
@@ -226,6 +230,7 @@ def _tiles_of(at: _Outside, root: dict[str, Any], free: int) -> _Part:
         outside,
         free,
         seen_px,
+        None if scene is None else made_for(scene),
     )
 
 
@@ -267,6 +272,7 @@ def _joined(parts: Sequence[_Part]) -> Tileset:
         joined("depth"),
         joined("surfels"),
         parts[0].seen_px,
+        parts[0].made_for,
     )
 
 

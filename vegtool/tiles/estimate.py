@@ -17,7 +17,7 @@ from vegtool.console import human_bytes, table
 from vegtool.errors import VegtoolError
 from vegtool.progress import Progress
 from vegtool.tiles.jobs import TILES, Failed, Made, SheetJob, World, do
-from vegtool.tiles.needed import passed_over, reached_by
+from vegtool.tiles.needed import hidden_by_ground, passed_over, reached_by
 from vegtool.tiles.pyramid import MOST, Pyramid
 from vegtool.tiles.quadtree import Node
 from vegtool.tiles.run import blocks, models
@@ -32,7 +32,7 @@ FAR_BYTES = 60.0
 SURFELS_S = 7.0
 """Seconds of one core for a square of MOST surfels, made of its quarters'."""
 SURFEL_BYTES = 20.0
-TOO_NEAR, TOO_FAR = "eyes too near", "eyes too far"
+TOO_NEAR, HIDDEN, TOO_FAR = "eyes too near", "behind ground", "eyes too far"
 """What is said of squares that no viewer is shown."""
 
 
@@ -52,7 +52,7 @@ class _Squares:
     kept: list[Node]
     made: list[Node]
     too_near: int = 0
-    too_far: int = 0
+    hidden: int = 0
 
 
 def _squares(pyramid: Pyramid, view: View | None) -> list[_Squares]:
@@ -62,13 +62,14 @@ def _squares(pyramid: Pyramid, view: View | None) -> list[_Squares]:
     if view is None:
         return [_Squares(nodes, nodes) for nodes in every]
     found, passed = [], passed_over(pyramid, view)
+    behind = hidden_by_ground(pyramid, view)
     for height, (nodes, reached) in enumerate(zip(every, reached_by(pyramid, view), strict=True)):
-        kept = [node for node in reached if node not in passed]
+        kept = [node for node in reached if node not in passed and node not in behind]
         made = kept
         if not pyramid.instanced(height):  # others may be made of them
             made = [node for node in nodes if node not in passed]
-        near = sum(node in passed for node in nodes)
-        found.append(_Squares(kept, made, near, len(nodes) - near - len(kept)))
+        near, hidden = (sum(node in part for node in nodes) for part in (passed, behind - passed))
+        found.append(_Squares(kept, made, near, hidden))
     return found
 
 
@@ -96,6 +97,7 @@ def _estimated(
     top = tree.height(squares[0].node.level)
     levels = []
     for height, here in enumerate(_squares(pyramid, view)):
+        nodes = tree.nodes(tree.depth - height)
         kept, anew = (
             sum(int(counts[tree.tiles_of(node)].sum()) for node in nodes) / max(plants[sample], 1)
             for nodes in (here.kept, here.made)
@@ -117,7 +119,11 @@ def _estimated(
             "seconds": round(seconds, 2),
         }
         if view is not None:
-            level |= {"too_near": here.too_near, "too_far": here.too_far}
+            level |= {
+                "too_near": here.too_near,
+                "hidden": here.hidden,
+                "too_far": len(nodes) - len(here.kept) - here.too_near - here.hidden,
+            }
         levels.append(level)
     progress("tiles", 1.0)
     facts = {
@@ -145,9 +151,9 @@ def _text(facts: dict[str, Any], processes: int) -> str:
         for level in facts["levels"]
     ]
     if "scene" in facts:
-        head += [TOO_NEAR, TOO_FAR]
+        head += [TOO_NEAR, HIDDEN, TOO_FAR]
         for row, level in zip(rows, facts["levels"], strict=True):
-            row += [f"{level['too_near']:,}", f"{level['too_far']:,}"]
+            row += [f"{level[key]:,}" for key in ("too_near", "hidden", "too_far")]
     many = f"{processes} processes" if processes > 1 else "one process"
     return (
         f"{facts['plants_at_most']:,} plants at most; {facts['tiles']:,} tiles, about "

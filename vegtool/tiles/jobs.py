@@ -40,7 +40,7 @@ from vegtool.tiles.make import (
 )
 from vegtool.tiles.options import TileOptions
 from vegtool.tiles.pyramid import Pyramid, pyramid_of
-from vegtool.tiles.quadtree import Node, Quadtree
+from vegtool.tiles.quadtree import Node, nodes_of
 from vegtool.tiles.shared import FOLDER, Shared
 from vegtool.tiles.source import scene_at
 from vegtool.tiles.stand import Stand
@@ -250,14 +250,6 @@ def name_of(job: Job) -> str:
 def called(name: str) -> str:
     """A part in a sentence for the user: tile 3/0/1, model 0/2, sheet 2."""
     return f"tile {name}" if name[0].isdigit() else name
-
-
-def nodes_of(tree: Quadtree, node: Node) -> list[Node]:
-    """A square and all on it, the smallest first."""
-    levels = [[node]]
-    while levels[-1][0].level < tree.depth:
-        levels.append([one for above in levels[-1] for one in tree.quarters(above)])
-    return [one for level in reversed(levels) for one in level]
 
 
 def _failed(name: str, error: Exception) -> Failed:

@@ -9,7 +9,7 @@ on: those have larger errors, and nearer boxes. A square of which no eye does is
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +17,7 @@ import numpy as np
 from vegtool.arrays import FloatArray
 from vegtool.formats.tileset import BLENDED, CLIENT_PX, TileEntry
 from vegtool.tiles.pyramid import Pyramid
-from vegtool.tiles.quadtree import Node
+from vegtool.tiles.quadtree import Node, nodes_of
 from vegtool.tiles.view import View
 
 
@@ -53,14 +53,34 @@ def reached_by(pyramid: Pyramid, view: View) -> list[list[Node]]:
     return found[::-1]
 
 
+def hidden_by_ground(pyramid: Pyramid, view: View) -> frozenset[Node]:
+    """The squares, with those on them, before all of which the ground is for every eye."""
+    found: set[Node] = set()
+    if not view.hills:
+        return frozenset()
+    front = pyramid.tree.nodes(0)
+    while front:
+        behind = view.hidden(_boxes(pyramid, front)).tolist()
+        for node, is_hidden in zip(front, behind, strict=True):
+            if is_hidden:
+                found.update(nodes_of(pyramid.tree, node))
+        front = [q for node in front if node not in found for q in pyramid.tree.quarters(node)]
+    for level in range(pyramid.tree.depth - 1, -1, -1):
+        for node in pyramid.tree.nodes(level):
+            if all(quarter in found for quarter in pyramid.tree.quarters(node)):
+                found.add(node)
+    return frozenset(found)
+
+
 def gives_way_px(surfels: bool) -> float:
     """Pixels of error from which on a square's quarters are drawn: of surfels beside its own."""
     return CLIENT_PX / (1 + BLENDED) if surfels else CLIENT_PX
 
 
-def pruned(root: TileEntry, view: View) -> TileEntry:
-    """A tileset without the tiles that no client goes on to from any eye, and without those on top
-    that have no content and a single child."""
+def pruned(root: TileEntry, view: View, hidden: Set[str] = frozenset()) -> TileEntry | None:
+    """A tileset without the tiles that no client goes on to from any eye, without those whose files
+    are hidden, and without those on top that have no content and a single child. None where nothing
+    is left."""
     leaves: set[int] = set()
     front: Sequence[TileEntry] = [root]
     while front:
@@ -74,18 +94,23 @@ def pruned(root: TileEntry, view: View) -> TileEntry:
             for child in one.children
         ]  # fmt: skip
 
-    def kept(tile: TileEntry) -> TileEntry:
-        below = () if id(tile) in leaves else tuple(map(kept, tile.children))
-        return replace(tile, children=below)
+    def kept(tile: TileEntry) -> TileEntry | None:
+        below = () if id(tile) in leaves else map(kept, tile.children)
+        there = tuple(one for one in below if one is not None)
+        if tile.uri in hidden or (tile.uri is None and not there):
+            return None
+        return replace(tile, children=there)
 
-    root = kept(root)
-    while root.uri is None and len(root.children) == 1:
-        (root,) = root.children
-    return root
+    top = kept(root)
+    while top is not None and top.uri is None and len(top.children) == 1:
+        (top,) = top.children
+    return top
 
 
-def contents_of(root: TileEntry) -> set[str]:
+def contents_of(root: TileEntry | None) -> set[str]:
     """The files of a tileset's tiles."""
+    if root is None:
+        return set()
     own = set() if root.uri is None else {root.uri}
     return own.union(*map(contents_of, root.children))
 

@@ -104,6 +104,14 @@ class Quadtree:
         return np.asarray(corner + self.side(node.level) / 2 + self.first * self.side_m)
 
 
+def nodes_of(tree: Quadtree, node: Node) -> list[Node]:
+    """A square and all on it, the smallest first."""
+    levels = [[node]]
+    while levels[-1][0].level < tree.depth:
+        levels.append([one for above in levels[-1] for one in tree.quarters(above)])
+    return [one for level in reversed(levels) for one in level]
+
+
 def quadtree_of(tiles: Tiles, side_m: float, above: int = 0) -> Quadtree:
     """The least pyramid over tiles of that side, of which there is one at least; and so many levels
     above it."""

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from vegtool.console import human_bytes, table
-from vegtool.tiles.estimate import TOO_FAR, TOO_NEAR
+from vegtool.tiles.estimate import HIDDEN, TOO_FAR, TOO_NEAR
 from vegtool.tiles.jobs import Failed, Made, World
 from vegtool.tiles.quadtree import Node
 
@@ -84,12 +84,13 @@ def text_of(facts: Mapping[str, Any]) -> str:
 
 def left_out(scene: Mapping[str, Any]) -> str:
     """What of a landscape no viewer of a scene is shown."""
-    head = ["left out of", "squares", TOO_NEAR, TOO_FAR, "with plants", "bytes, about"]
+    head = ["left out of", "squares", TOO_NEAR, HIDDEN, TOO_FAR, "with plants", "bytes, about"]
     rows = [
         [
             f"{row['side_m']:,.4g} m",
             f"{row['squares'] - row['kept']:,} of {row['squares']:,}",
             f"{row['too_near']:,}",
+            f"{row['hidden']:,}",
             f"{row['too_far']:,}",
             f"{row['plants']:,}",
             human_bytes(row["bytes"]),

@@ -32,7 +32,6 @@ from vegtool.tiles.jobs import (
     called,
     do,
     name_of,
-    nodes_of,
 )
 from vegtool.tiles.journal import (
     PART,
@@ -43,7 +42,7 @@ from vegtool.tiles.journal import (
     write_journal,
 )
 from vegtool.tiles.pyramid import Pyramid, used_levels
-from vegtool.tiles.quadtree import Node
+from vegtool.tiles.quadtree import Node, nodes_of
 from vegtool.tiles.tree import index_json, tree_of
 from vegtool.workers import alone
 

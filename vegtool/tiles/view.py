@@ -26,5 +26,12 @@ class View(Protocol):
     def passed(self, boxes: FloatArray, error_m: FloatArray) -> BoolArray:
         """(n,) whether every eye sees errors (n,), metres, as more pixels than clients let be."""
 
+    @property
+    def hills(self) -> bool:
+        """Whether there is anything that hides."""
+
+    def hidden(self, boxes: FloatArray) -> BoolArray:
+        """(n,) whether the ground is before all of a box, for every eye."""
+
     def pixels_per_metre(self, boxes: FloatArray) -> FloatArray:
         """(n,) pixels that no metre in a box is more than; infinite where an eye may be in it."""

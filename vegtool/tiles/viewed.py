@@ -24,7 +24,6 @@ from vegtool.formats.tileset import TileEntry
 from vegtool.progress import Progress, silent
 from vegtool.tiles.estimate import FAR_BYTES, SURFEL_BYTES
 from vegtool.tiles.jobs import (
-    TILES,
     BlockJob,
     Job,
     Lacking,
@@ -35,12 +34,10 @@ from vegtool.tiles.jobs import (
     World,
     file_of,
     name_of,
-    nodes_of,
 )
 from vegtool.tiles.journal import Entry, appended
-from vegtool.tiles.needed import contents_of, passed_over, pruned
-from vegtool.tiles.pyramid import FEWEST, PER_PLANT
-from vegtool.tiles.quadtree import Node
+from vegtool.tiles.needed import contents_of, hidden_by_ground, passed_over, pruned
+from vegtool.tiles.quadtree import Node, nodes_of
 from vegtool.tiles.run import COST, TREE, Each, Run, blocks, clean, models
 from vegtool.tiles.tree import tree_of
 from vegtool.tiles.view import View
@@ -56,7 +53,8 @@ Write = Callable[[Entry], None]
 
 class ViewedRun(Run):
     """A tileset that is being made for some viewers. passed: squares that none is far enough from.
-    surveyed: squares of instances, by name. kept: files of the tiles that are shown."""
+    hidden: squares that none sees for the ground. surveyed: squares of instances, by name. kept:
+    files of the tiles that are shown."""
 
     def __init__(
         self, world: World, view: View, each: Each | None = None, progress: Progress = silent
@@ -64,6 +62,7 @@ class ViewedRun(Run):
         super().__init__(world, each, progress)
         self.view = view
         self.passed = passed_over(world.pyramid, view)
+        self.hidden = hidden_by_ground(world.pyramid, view) - self.passed
         self.surveyed: dict[str, Surveyed] = {}
         self.kept: set[str] = set()
         self._plants = 0
@@ -126,28 +125,38 @@ class ViewedRun(Run):
 
     def left_out(self) -> list[dict[str, Any]]:
         """Of each height at which anything is left out: how many squares there are and are kept;
-        too_near: that every eye is too near to; too_far: that stay behind those that they lie on,
-        as no eye comes so near, with how many plants; and about how many bytes all these are."""
+        too_near: that every eye is too near to; hidden: before which the ground is; too_far: that
+        stay behind those that they lie on, as no eye comes so near. plants: on the last two, and
+        bytes: about how many all of them are."""
         tree = self.world.pyramid.tree
         rows = []
         for height in range(tree.depth + 1):
             nodes = tree.nodes(tree.depth - height)
-            far = [one for one in map(self._told_of, nodes) if one and not self._is_shown(one)]
             near = [node for node in nodes if node in self.passed]
             kept = sum(file_of(node) in self.kept for node in nodes)
-            if not far and not near:
+            rest = [node for node in nodes if file_of(node) not in self.kept]
+            hidden, far = (
+                [one for one in map(self._told_of, part) if one is not None]
+                for part in (
+                    [node for node in rest if node in self.hidden],
+                    [node for node in rest if node not in self.hidden],
+                )
+            )
+            others = [*hidden, *far]
+            if not others and not near:
                 continue
             rows.append(
                 {
                     "height": height,
                     "side_m": tree.side_m * 2.0**height,
-                    "squares": kept + len(near) + len(far),
+                    "squares": kept + len(near) + len(others),
                     "kept": kept,
                     "too_near": len(near),
                     "too_far": len(far),
-                    "plants": sum(one.facts["plants"] for one in far),
+                    "hidden": len(hidden),
+                    "plants": sum(one.facts["plants"] for one in others),
                     "bytes": round(
-                        sum(map(self._bytes_of, far)) + sum(map(self._near_bytes, near))
+                        sum(map(self._bytes_of, others)) + sum(map(self._near_bytes, near))
                     ),
                 }
             )
@@ -159,9 +168,6 @@ class ViewedRun(Run):
         if entry is None and str(node) in self.surveyed:
             entry = self.surveyed[str(node)].entry
         return entry if entry is not None and entry.facts["plants"] else None
-
-    def _is_shown(self, entry: Entry) -> bool:
-        return f"{TILES}/{entry.name.replace('/', '_')}.glb" in self.kept
 
     def _is_kept(self, entry: Entry) -> bool:
         return entry.name in self._shared or bool(self.kept & entry.files.keys())
@@ -176,15 +182,18 @@ class ViewedRun(Run):
         if pyramid.instanced(pyramid.tree.height(node.level)):
             return INSTANCE_BYTES * count
         if pyramid.options.surfels:
-            return SURFEL_BYTES * FEWEST
-        return FAR_BYTES * min(pyramid.budget(node), PER_PLANT * count)
+            return SURFEL_BYTES * pyramid.surfels_for(count * float(pyramid.of_level[:, 0].mean()))
+        return FAR_BYTES * pyramid.budget(node)
 
     def _root(self) -> TileEntry | None:
         looked_at = {
             name: one.entry for name, one in self.surveyed.items() if name not in self.failed
         }
         root = tree_of(self.world.pyramid, {**looked_at, **self.found})
-        return None if root is None else pruned(root, self.view)
+        if root is None:
+            return None
+        left = pruned(root, self.view, {file_of(node) for node in self.hidden})
+        return pruned(root, self.view) if left is None else left  # rather than nothing
 
     def _do(self, jobs: Sequence[Job], write: Write) -> Iterator[Outcome]:
         for outcome in super()._do(jobs, write):
