@@ -25,7 +25,8 @@ from vegtool.convert.options import (
     TRIANGLES_PER_BILLBOARD,
     ConvertOptions,
 )
-from vegtool.convert.seen import beginning, complete, drawn, first_needed, for_span, omitted
+from vegtool.convert.seen import beginning, complete, drawn, omitted, tries
+from vegtool.convert.textures import seen_textures
 from vegtool.errors import QualityError
 from vegtool.lighting.crown import crown_normals
 from vegtool.lighting.leaves import translucent
@@ -91,32 +92,32 @@ def convert(
         )
         farthest = rounded_up(distance_of(plant, options.display, NEAR_LIMITS[0]))
         whole = make.wanted(plant, farthest)
-        wanted = for_span(whole, span, make.fewer)
-        first, made = first_needed(whole, span), dict[int, Level]()
-        while True:
+        attempts, made = list(tries(whole, span, make.fewer)), dict[tuple[int, float], Level]()
+        for wanted in attempts:
             levels = [original]
-            for index in range(first, len(wanted)):
-                if index not in made:
-                    count, near = wanted[index]
+            for index, (count, near) in enumerate(wanted):
 
-                    def report(stage: str, fraction: float, index: int = index) -> None:
-                        done = before + (making - before) * (index + fraction) / len(wanted)
-                        progress(f"LOD{index + 1}: {stage}", done)
+                def report(
+                    stage: str, fraction: float, index: int = index, of: int = len(wanted)
+                ) -> None:
+                    done = before + (making - before) * (index + fraction) / of
+                    progress(f"LOD{index + 1}: {stage}", done)
 
+                if (count, near) not in made:
                     level = make(count, min(near, farthest), report)
-                    made[index] = replace(level, near_distance_m=near)
-                saves = made[index].triangles <= MOST_OF_PREVIOUS * levels[-1].triangles
+                    made[count, near] = replace(level, near_distance_m=near)
+                level = made[count, near]
+                saves = level.triangles <= MOST_OF_PREVIOUS * levels[-1].triangles
                 if saves or (index == len(wanted) - 1 and len(levels) == 1):
-                    levels.append(made[index])
+                    levels.append(level)
             kept, notes = _measured(
                 plant, levels[1:], measure, options,
                 lambda stage, fraction: progress(stage, making + (1 - making) * fraction),
-                truth_at, span, finest=first == 0,
+                truth_at, span, last=wanted is attempts[-1],
             )  # fmt: skip
             kept = drawn(kept, span)
-            if first == 0 or complete(kept, span):
+            if complete(kept, span):
                 break
-            first -= 1  # what was to be used there errs too much
         shadow = None
         if options.shadow_proxy is not None:
             from vegtool.refine.shadow_proxy import shadow_proxy
@@ -128,7 +129,7 @@ def convert(
                 lambda casting, seen, near_m: level_maker(casting, seen, options, casts=True)(
                     most, near_m, lambda stage, _: progress(stage, making)
                 ),
-                wanted[first][1] if wanted else whole[0][1],
+                (wanted or whole)[0][1],
             )
         if options.refine != "none" and options.method != SURFELS:
             from vegtool.refine.reach import coverage_notes
@@ -145,7 +146,10 @@ def convert(
     baked = {} if sun is None else sun.as_dict()
     left_out = tuple[Omitted, ...]()
     if limits is not None:
-        left_out = omitted(whole, first, len(wanted), original, is_whole, limits)
+        left_out = omitted(whole, wanted, original, is_whole, limits)
+        if is_whole:
+            original, smaller = _smaller(original, limits)
+            left_out = (*left_out, *smaller)
     if left_out:
         notes = (*notes, f"left out for the scene: {_listed(left_out)}")
     return LodChain(
@@ -167,10 +171,10 @@ def convert(
 
 def _measured(
     plant: Plant, levels: Sequence[Level], measure: MeasureOptions, options: ConvertOptions,
-    progress: Progress, truth_at: TruthsAt, span: Span, finest: bool,
+    progress: Progress, truth_at: TruthsAt, span: Span, last: bool,
 ) -> tuple[tuple[Level, ...], tuple[str, ...]]:  # fmt: skip
-    """`with_distances`; none where there are none, or where none keeps to the limit and there are
-    finer ones that may."""
+    """`with_distances`; none where there are none, or where none keeps to the limit and it is not
+    the last try."""
     from vegtool.measure.chain import with_distances
 
     if not levels:
@@ -178,9 +182,20 @@ def _measured(
     try:
         return with_distances(plant, levels, measure, options.display, progress, truth_at, span)
     except QualityError:
-        if finest:
+        if last:
             raise
         return (), ()
+
+
+def _smaller(original: Level, limits: Limits) -> tuple[Level, tuple[Omitted, ...]]:
+    """The original without texels that nobody sees."""
+    assert original.mesh is not None
+    reduced = replace(original, mesh=seen_textures(original.mesh, limits))
+    fewer = original.texels - reduced.texels
+    if not fewer:
+        return original, ()
+    what = f"{fewer:,} of the original's {original.texels:,} texels"
+    return reduced, (Omitted(what, "smaller than a pixel from as near as any eye is"),)
 
 
 def _listed(left_out: Sequence[Omitted]) -> str:

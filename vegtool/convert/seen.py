@@ -3,14 +3,15 @@
 A level is drawn from its switch distance until the next one has replaced it, at the end of that
 one's fade. Those that are made for distances beyond the farthest eye are drawn nowhere; of those
 that give way before the nearest eye comes, none are but the last, which is made for that eye then,
-with as many billboards and texels as its size there asks for.
+with as many billboards and texels as its size there asks for, or as it takes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
+from vegtool.convert.options import LEVEL_RATIO
 from vegtool.limits import Limits, Omitted, Span, between
 from vegtool.lod import Level
 from vegtool.measure.distances import rounded_down
@@ -21,25 +22,25 @@ Fewer = Callable[[int, float, float], int]
 """Of such a level, the number that it may have where it is for a distance farther away."""
 
 
-def first_needed(wanted: Sequence[Wanted], span: Span) -> int:
-    """Index of the last level that has replaced all before it where the nearest eye is, if it can
-    be used from where it is made for; 0 where none has."""
-    return max((index for index, (_, near) in enumerate(wanted) if span.replaced(near)), default=0)
+def tries(wanted: Sequence[Wanted], span: Span, fewer: Fewer) -> Iterator[list[Wanted]]:
+    """Chains to try, of levels `wanted` for any eye, each dearer than the one before.
 
-
-def for_span(wanted: Sequence[Wanted], span: Span, fewer: Fewer) -> list[Wanted]:
-    """The levels, the finest of them made for the nearest eye; without those
-    that no eye is far enough away for."""
-    first, found = first_needed(wanted, span), list[Wanted]()
+    Each begins with a level that is for the nearest eye alone, and stands for all that give way
+    before it comes: if that one errs too much there, with twice as many billboards. The last has
+    all levels, for who keeps the original beside them, none for nearer than the nearest eye.
+    """
+    reached = [one for one in wanted if span.reached(one[1])]
     at_m = rounded_down(span.replaced_m)
-    for index, (count, near) in enumerate(wanted):
-        if not span.reached(near):
-            break
-        if index > first or near >= at_m:
-            found.append((count, near))
-        else:  # one before the first is there because that one errs too much: it has all of its own
-            found.append((fewer(count, near, at_m) if index == first else count, at_m))
-    return found
+    before = [one for one in reached if span.replaced(one[1])]
+    if before:
+        count, near = before[-1]
+        count, most = fewer(count, near, at_m), max(count for count, _ in before)
+        at_m = max(at_m, near)
+        yield [(count, at_m), *reached[len(before) :]]
+        while count < most:
+            count = min(LEVEL_RATIO * count, most)
+            yield [(count, at_m), *reached[len(before) :]]
+    yield [(count, max(near, at_m)) for count, near in reached]
 
 
 def drawn(levels: Sequence[Level], span: Span) -> tuple[Level, ...]:
@@ -63,18 +64,21 @@ def beginning(levels: Sequence[Level]) -> tuple[Level, ...]:
 
 
 def omitted(
-    wanted: Sequence[Wanted], first: int, last: int, original: Level, whole: bool, limits: Limits
+    wanted: Sequence[Wanted], made: Sequence[Wanted], original: Level, whole: bool, limits: Limits
 ) -> tuple[Omitted, ...]:
-    """What a chain does without: of the levels `wanted` for any eye, those before `first` and from
-    `last` on, and the original unless it is `whole`."""
+    """What a chain does without: of the levels `wanted` for any eye, those that none of `made` is,
+    and the original unless it is `whole`."""
     seen = f"plants are seen {between(limits.nearest_m, limits.farthest_m)}"
     found = list[Omitted]()
     if not whole:
         why = f"no eye is near enough: {seen}"
         found.append(Omitted("the original", why, triangles=original.triangles))
-    parts = [(wanted[:first], "near"), (wanted[last:], "far")]
-    for part, where in parts:
-        for count, near in part:
-            what = f"a level of up to {count:,} billboards for {near:g} m on"
-            found.append(Omitted(what, f"no eye is {where} enough: {seen}"))
+    first_m = min((near for _, near in made), default=0.0)
+    missing = [one for one in wanted if one not in made]
+    nearer = [one for one in missing if one[1] <= first_m]
+    for count, near in missing:
+        why = f"no eye is {'near' if (count, near) in nearer else 'far'} enough: {seen}"
+        if nearer and (count, near) == nearer[-1] and made[0] not in wanted:
+            why = f"one of up to {made[0][0]:,} for {made[0][1]:g} m on is in its place: {seen}"
+        found.append(Omitted(f"a level of up to {count:,} billboards for {near:g} m on", why))
     return tuple(found)
