@@ -39,8 +39,8 @@ def box(x: float, z: float, top: float) -> FloatArray:
 
 
 def test_what_is_behind_a_ridge(tmp_path: Path) -> None:
-    """The crest begins 95 m from the farthest eye, 28 m above it, half of the way to the near side of
-    a box, which is hidden up to 58 m, then. Boxes before the ridge and on it are seen, and so is
+    """The crest begins 95 m from the farthest eye, 28 m above it, half of the way to the near side
+    of a box, which is hidden up to 58 m, then. Boxes before the ridge and on it are seen, and so is
     all from above, and where the ridge ends."""
     behind = looking(tmp_path, ridge())
     assert hidden(box(90, 0, 25), behind).all() and hidden(box(90, 0, 55), behind).all()
