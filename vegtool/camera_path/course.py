@@ -13,6 +13,8 @@ from vegtool.camera_path.file import CameraPath
 
 Ground = Callable[[float, float], float]
 """The height of the ground in metres at x, z in metres."""
+Heights = Callable[[FloatArray], FloatArray]
+"""(n,) heights of the ground in metres at (n, 2) x, z in metres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +33,7 @@ class Course:
         return np.asarray((1 - fraction) * start + fraction * end)
 
     def at(
-        self, leg: Legs, parameter: FloatArray, fraction: FloatArray, ground: Ground | None
+        self, leg: Legs, parameter: FloatArray, fraction: FloatArray, ground: Heights | None
     ) -> FloatArray:
         """(k, 3) metres, on legs (k,) at parameters (k,) of their curves, which are reached after
         fractions (k,) of their lengths. ground: what heights are above; level at 0 without."""
@@ -39,18 +41,22 @@ class Course:
         if ground is not None:
             share = self.share(leg, fraction)
             smooth = self.curve.at(leg, parameter, self.ground)[:, 0]
-            for k in np.flatnonzero(share > 0):
-                real = ground(float(position[k, 0]), float(position[k, 2]))
-                position[k, 1] += share[k] * (real - smooth[k])
+            on = share > 0
+            position[on, 1] += share[on] * (ground(position[on][:, [0, 2]]) - smooth[on])
         return position
 
 
-def course_of(path: CameraPath, ground: Ground | None = None) -> Course:
+def heights(ground: Ground) -> Heights:
+    """The heights of ground that is asked place by place."""
+    return lambda xz: np.array([ground(float(x), float(z)) for x, z in xz], np.float64)
+
+
+def course_of(path: CameraPath, ground: Heights | None = None) -> Course:
     """The course of a path over the ground; level at 0 without."""
     points = np.array([station.position for station in path.stations], np.float64)
     above = np.array([station.above_ground for station in path.stations])
-    heights = np.zeros((len(points), 1))
+    under = np.zeros((len(points), 1))
     if ground is not None:
-        heights[:, 0] = [ground(float(x), float(z)) for x, _, z in points]
-    points[above, 1] += heights[above, 0]
-    return Course(path, through(points, path.loop and len(points) > 1), heights)
+        under[:, 0] = ground(points[:, [0, 2]])
+    points[above, 1] += under[above, 0]
+    return Course(path, through(points, path.loop and len(points) > 1), under)

@@ -131,7 +131,9 @@ def pieces_of(course: Course, margin: float, floor: Floor, height: Range | None)
             course.curve.walked, length, out=np.zeros((legs, count)), where=length > 0
         )
         parameter = np.tile(np.linspace(0.0, 1.0, count), legs)
-        at = course.at(leg, parameter, fraction.ravel(), floor.height_at).reshape(legs, count, 3)
+        at = course.at(leg, parameter, fraction.ravel(), floor.terrain.height).reshape(
+            legs, count, 3
+        )
         share = course.share(leg, fraction.ravel()).reshape(legs, count)
         level = floor.terrain.height(at[..., [0, 2]].reshape(-1, 2)).reshape(legs, count)
         usual = level.mean(axis=1, keepdims=True)  # heights are small from there on

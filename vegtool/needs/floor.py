@@ -22,10 +22,6 @@ class Floor:
     terrain: Terrain
     feet: tuple[float, float] | None = None
 
-    def height_at(self, x: float, z: float) -> float:
-        """Metres, as paths are walked: 0 where there is no ground."""
-        return float(self.terrain.height(np.array([[x, z]]))[0])
-
     def within(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Bounds, (n,) metres each, in rectangles (n, 2) to (n, 2): the least there are, but for
         large ones, for which they are those of all samples that reach into them."""

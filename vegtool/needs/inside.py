@@ -63,7 +63,7 @@ def _along_path(viewers: Viewers, count: int, random: np.random.Generator) -> Fl
         leg = random.choice(len(legs), count, p=weight)
         fraction = random.random(count)
         parameter = course.curve.parameter(leg, fraction)
-        at = course.at(leg, parameter, fraction, viewers.floor.height_at)
+        at = course.at(leg, parameter, fraction, viewers.floor.terrain.height)
         share = course.share(leg, fraction)
     else:
         at = np.repeat(course.curve.points, count, axis=0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from math import inf, pi
 from typing import Literal
 
@@ -24,8 +24,8 @@ from vegtool.tiles.stand import stand_on
 from vegtool.tiles.terrain import Terrain
 
 Lit = Literal["moving", "fixed", "unsaid"]
-FULL = (-pi / 2, pi / 2)
-"""Radians: all elevations."""
+FEW = 32
+"""Plants that are looked at one by one; of more, it is asked first whether they add anything."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +84,18 @@ class _Plants:
     foot: FloatArray
     top: FloatArray
 
+    def __len__(self) -> int:
+        return len(self.middle)
+
+    def halves(self) -> list[_Plants]:
+        """Those before and those after the one in the middle, along the longer side."""
+        axis = int(np.ptp(self.middle, axis=0).argmax())
+        order, half = np.argsort(self.middle[:, axis], kind="stable"), len(self) // 2
+        return [
+            _Plants(*(getattr(self, item.name)[part] for item in fields(self)))
+            for part in (order[:half], order[half:])
+        ]
+
 
 def needs_of(
     scene: Scene,
@@ -130,32 +142,63 @@ def ball_of(species: Species) -> tuple[float, float]:
 
 
 def _look(known: _Known, viewers: Viewers, plants: _Plants, capped: bool) -> None:
-    """Add plants to what is known. capped: whether eyes above their tops do not count."""
-    known.plants += len(plants.middle)
-    cells = viewers.cells
-    known.above |= bool(cells.high.max() > plants.foot.min())
-    known.below |= bool(cells.low.min() < plants.top.max())
-    box = np.stack([plants.middle.min(axis=0), plants.middle.max(axis=0)])
-    middle, spread = box.mean(axis=0)[None], float(np.linalg.norm(np.ptp(box, axis=0))) / 2
-    near, far = float(viewers.nearest(middle)[0]), float(viewers.farthest(middle)[0])
-    if (near - spread) / plants.scale.max() < known.nearest:
-        found = (viewers.nearest(plants.middle) / plants.scale).min()
-        known.nearest = min(known.nearest, float(found))
-    if (far + spread) / plants.scale.min() > known.farthest:
-        found = (viewers.farthest(plants.middle) / plants.scale).max()
-        known.farthest = max(known.farthest, float(found))
-    if known.sides.all():
-        seen = viewers.directions(middle)
-        apart = float(np.arcsin(min(spread / near, 1.0))) if near > 0 else pi
-        low, high = max(seen.low[0] - apart, -pi / 2), min(seen.high[0] + apart, pi / 2)
-        outside = near - spread > plants.radius.max() or (known.low, known.high) == FULL
-        if outside and known.low <= low and high <= known.high:
-            return
-    seen = viewers.directions(plants.middle, plants.radius, plants.top if capped else None)
-    known.low = min(known.low, float(seen.low.min()))
-    known.high = max(known.high, float(seen.high.max()))
+    """Add plants to what is known. capped: whether eyes above their tops do not count.
+
+    Groups of them that cannot add anything are passed over; others are halved, until few are left.
+    """
+    known.plants += len(plants)
+    known.above |= bool(viewers.cells.high.max() > plants.foot.min())
+    known.below |= bool(viewers.cells.low.min() < plants.top.max())
     if not known.sides.all():
-        known.sides |= covered(seen.start - plants.yaw, seen.extent)
+        start, extent = viewers.azimuths(plants.middle, plants.radius)
+        known.sides |= covered(start - plants.yaw, extent)
+    left = [plants]
+    while left:
+        part = left.pop()
+        wanted = _wanted(known, viewers, part)
+        if any(wanted) and len(part) > FEW:
+            left += part.halves()
+        elif any(wanted):
+            _add(known, viewers, part, capped, wanted)
+
+
+def _wanted(known: _Known, viewers: Viewers, plants: _Plants) -> tuple[bool, bool, bool]:
+    """Whether plants may be nearer, farther, or seen from another elevation than is known: by what
+    holds for the middle of them all, and how far they are from it."""
+    low, high = plants.middle.min(axis=0), plants.middle.max(axis=0)
+    middle, spread = (low + high)[None] / 2, float(np.linalg.norm(high - low)) / 2
+    near, far = float(viewers.nearest(middle)[0]), float(viewers.farthest(middle)[0])
+    least, most = viewers.elevations(middle)
+    apart = float(np.arcsin(min(spread / near, 1.0))) if near > 0 else pi
+    around = near - spread <= plants.radius.max() or apart >= pi / 2
+    lowest, highest = -pi / 2, pi / 2
+    if not around:
+        lowest, highest = float(least[0]) - apart, float(most[0]) + apart
+    return (
+        (near - spread) / plants.scale.max() < known.nearest and known.nearest > 0,
+        (far + spread) / plants.scale.min() > known.farthest,
+        max(lowest, -pi / 2) < known.low or min(highest, pi / 2) > known.high,
+    )
+
+
+def _add(
+    known: _Known,
+    viewers: Viewers,
+    plants: _Plants,
+    capped: bool,
+    wanted: tuple[bool, bool, bool],
+) -> None:
+    nearer, farther, elsewhere = wanted
+    if nearer:
+        near = viewers.nearest(plants.middle) / plants.scale
+        known.nearest = min(known.nearest, float(near.min()))
+    if farther:
+        far = viewers.farthest(plants.middle) / plants.scale
+        known.farthest = max(known.farthest, float(far.max()))
+    if elsewhere:
+        ceiling = plants.top if capped else None
+        low, high = viewers.elevations(plants.middle, plants.radius, ceiling)
+        known.low, known.high = min(known.low, float(low.min())), max(known.high, float(high.max()))
 
 
 def _need(one: Species, found: _Known, display: Display, lit: Lit, sun: Sun | None) -> Need:

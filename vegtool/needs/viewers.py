@@ -113,15 +113,26 @@ class Viewers:
         """Where eyes are as seen from points (n, 3), metres; anywhere where one may be within a
         radius, metres. ceiling: (n,) metres, heights in the scene's frame; eyes above do not count,
         unless all are."""
+        return Directions(*self.azimuths(points, radius), *self.elevations(points, radius, ceiling))
+
+    def azimuths(
+        self, points: FloatArray, radius: FloatArray | float = 0.0
+    ) -> tuple[FloatArray, FloatArray]:
+        """start and extent of `directions`."""
         inside = self.nearest(points, radius) <= 0
         start, extent = self._azimuths(points)
+        return np.where(inside, 0.0, start), np.where(inside, 2 * np.pi, extent)
+
+    def elevations(
+        self,
+        points: FloatArray,
+        radius: FloatArray | float = 0.0,
+        ceiling: FloatArray | None = None,
+    ) -> tuple[FloatArray, FloatArray]:
+        """low and high of `directions`."""
+        inside = self.nearest(points, radius) <= 0
         low, high = self._elevations(points, ceiling)
-        return Directions(
-            np.where(inside, 0.0, start),
-            np.where(inside, 2 * np.pi, extent),
-            np.where(inside, -np.pi / 2, low),
-            np.where(inside, np.pi / 2, high),
-        )
+        return np.where(inside, -np.pi / 2, low), np.where(inside, np.pi / 2, high)
 
     def _elevations(
         self, points: FloatArray, ceiling: FloatArray | None
@@ -249,7 +260,7 @@ def viewers_of(scene: Scene, ground: Terrain, placement: Placement | None = None
         )
     if camera.path is not None:
         path = read_path(scene.path.parent / camera.path)
-        return _along(course_of(path, floor.height_at), margin, floor, height)
+        return _along(course_of(path, floor.terrain.height), margin, floor, height)
     notes = []
     if camera.polygon:
         corners = np.array(camera.polygon, np.float64)
@@ -294,7 +305,8 @@ def _check_above(path: CameraPath, pieces: Pieces, floor: Floor) -> None:
         return
     for number, station in enumerate(path.stations):
         x, y, z = station.position
-        own = y if station.above_ground else y - floor.height_at(x, z)
+        ground = float(floor.terrain.height(np.array([[x, z]]))[0])
+        own = y if station.above_ground else y - ground
         if own < -UNDER_M:
             raise UsageError(
                 f"{path.at(number, 'position')}: position: station {number + 1}, at {x:g}, {z:g}, "

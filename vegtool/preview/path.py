@@ -15,7 +15,7 @@ from math import ceil, isfinite
 import numpy as np
 
 from vegtool.arrays import FloatArray
-from vegtool.camera_path.course import Course, Ground, course_of
+from vegtool.camera_path.course import Course, Ground, course_of, heights
 from vegtool.camera_path.curve import Curve, Legs
 from vegtool.camera_path.file import FPS, CameraPath, Station
 from vegtool.errors import UsageError
@@ -129,7 +129,7 @@ def _seen(
 
 def _walked(path: CameraPath, ground: Ground | None) -> _Walk:
     """The path with the ground under it, and its times and directions as they follow from both."""
-    course = course_of(path, ground)
+    course = course_of(path, None if ground is None else heights(ground))
     curve = course.curve
     yaw, pitch = _angles(path, curve)
     again = [*range(len(yaw)), 0] if curve.closed else list(range(len(yaw)))
@@ -191,7 +191,8 @@ def _positions(walk: _Walk, time_s: FloatArray, ground: Ground | None) -> FloatA
     begins, ends = walk.time_s[leg], walk.time_s[leg + 1]
     spent = np.divide(time_s - begins, ends - begins, out=np.ones_like(begins), where=ends > begins)
     fraction = np.clip(spent, 0.0, 1.0)
-    return walk.course.at(leg, curve.parameter(leg, fraction), fraction, ground)
+    real = None if ground is None else heights(ground)
+    return walk.course.at(leg, curve.parameter(leg, fraction), fraction, real)
 
 
 def _directions(walk: _Walk, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
