@@ -3,8 +3,9 @@
 What lies behind ground is below the horizon (L. De Floriani and P. Magillo, "Visibility algorithms
 on triangulated digital terrain models", 1994, section 2). Here all lines of sight from a column of
 eyes to a box are taken together: they cross an upright plane between both along a line, no higher
-than known. Where the ground along all of it is higher, none of them goes on. Least heights of the
-ground are taken from a pyramid of them, so that wide lines cost no more than narrow ones.
+than known. Where the ground along all of it is higher, none of them goes on. What is not hidden as
+a whole may be by its quarters. Least heights of the ground are taken from a pyramid of them, so
+that wide lines cost no more than narrow ones.
 
 Nothing is promised of what is not found: a box may be hidden by one hill from some eyes, by another
 from others, or behind a crest between two planes.
@@ -21,14 +22,20 @@ from vegtool.needs.cells import Cells
 from vegtool.needs.planar import BoolArray
 from vegtool.needs.viewers import Viewers
 from vegtool.tiles.grid import Grid
+from vegtool.tiles.terrain import Terrain
 
 PLANES = 32
 """Upright planes between a column of eyes and a box."""
 ACROSS = 16
 """Parts of the line in which lines of sight cross one."""
-OVER_M = 0.5
-"""How much higher than a line of sight ground is to be that hides it: clients' ground may be
-coarser."""
+OVER_M = 0.1
+"""How much higher than a line of sight ground is to be that hides it, for what is rounded."""
+SPLITS = 1
+"""Times that a box which seems to be hidden is cut into quarters, each of which may be by another
+crest. Of 400 squares of 32 m among hills of 50 m, 58 seem to be, from a lawn; with 0, 1 and 2 times
+30, 36 and 38 are found, in 0.5, 1.4 and 3.7 s."""
+FEW = 12
+"""Columns from which it is looked at whether a box seems to be."""
 SIDE = 16
 """Of the squares that columns are put together in, along each side of all of them."""
 TURNS = 16
@@ -70,11 +77,56 @@ def hidden(boxes: FloatArray, viewers: Viewers) -> BoolArray:
     """(n,) whether the ground is before all of boxes (n, 2, 3), least and greatest corners in
     metres, as seen from wherever an eye may be; of none where it is no heightmap."""
     grid, cells = viewers.floor.terrain.grid, viewers.cells
-    found = np.zeros(len(boxes), np.bool_)
     if grid is None or not np.isfinite(cells.high).all():
-        return found
+        return np.zeros(len(boxes), np.bool_)
     least, cells = _least_of(grid), _fewer(cells)
-    left = np.arange(len(boxes))
+    may_be = _seems_hidden(boxes, cells, viewers.floor.terrain)
+    of, pieces = np.flatnonzero(may_be), boxes[may_be]
+    for _ in range(SPLITS):
+        seen = ~_all_hidden(pieces, cells, least)
+        of, pieces = np.repeat(of[seen], 4), _quarters(pieces[seen])
+    may_be[of[~_all_hidden(pieces, cells, least)]] = False
+    return may_be
+
+
+def _seems_hidden(boxes: FloatArray, cells: Cells, ground: Terrain) -> BoolArray:
+    """(n,) whether the ground is before the top of boxes, in its middle and in its corners, as seen
+    from the middles of some columns: else the rest need not be looked at."""
+    some = np.unique(np.linspace(0, len(cells) - 1, FEW).astype(np.int64))
+    middle = (cells.start[some] + cells.end[some]) / 2
+    eyes = np.stack([middle[:, 0], cells.high[some], middle[:, 1]], axis=1)
+    share = np.linspace(0, 1, PLANES)[:, None, None]
+    found = np.ones(len(boxes), np.bool_)
+    for x, z in ((0.5, 0.5), (0, 0), (0, 1), (1, 0), (1, 1)):
+        left = np.flatnonzero(found)
+        low, high = boxes[left, 0], boxes[left, 1]
+        place = np.where([False, True, False], high, low + (high - low) * [x, 1, z])
+        for eye in eyes:
+            line = eye + share * (place - eye)
+            height = ground.height(line[..., [0, 2]].reshape(-1, 2)).reshape(line.shape[:2])
+            found[left[~(height > line[..., 1]).any(axis=0)]] = False
+    return found
+
+
+def _quarters(boxes: FloatArray) -> FloatArray:
+    """(4 n, 2, 3) each box's quarters, as high as it is."""
+    low, high = boxes[:, 0], boxes[:, 1]
+    middle = (low + high) / 2
+    found = []
+    for x in (False, True):
+        for z in (False, True):
+            upper = np.array([x, False, z])
+            ends = (
+                np.where(upper, middle, low),
+                np.where(upper | [False, True, False], high, middle),
+            )
+            found.append(np.stack(ends, axis=1))
+    return np.stack(found, axis=1).reshape(-1, 2, 3)
+
+
+def _all_hidden(boxes: FloatArray, cells: Cells, least: _Least) -> BoolArray:
+    """(n,) whether no line from any column to a box goes over the ground."""
+    found, left = np.zeros(len(boxes), np.bool_), np.arange(len(boxes))
     turns = min(TURNS, len(cells))
     for turn in range(turns):
         kept = np.zeros(len(cells), np.bool_)
