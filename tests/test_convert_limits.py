@@ -252,7 +252,7 @@ def carded(texels: int, side_m: float, alpha: np.ndarray | None = None) -> Plant
 def test_texels_that_are_smaller_than_a_pixel() -> None:
     """64 texels on 2 m are 32 to the metre. From 60 m, a metre is 15.6 pixels, and some
     more of what is nearer than the middle: half of the texels do, a quarter from 120 m on."""
-    card = carded(64, 2.0)
+    card = carded(64, 2.0, np.full((64, 64), 255))
     textures = [
         seen_textures(card, limits(nearest)).materials[0].color_texture
         for nearest in (20.0, 58.0, 64.0, 120.0, 1e9)
@@ -281,10 +281,12 @@ def test_no_eye_is_nearer_to_a_face() -> None:
         assert (bound <= apart).all() and bound.max() <= 4.0
 
 
-def test_as_much_of_a_smaller_texture_passes_the_alpha_test() -> None:
-    """Leaves of a texel each on a sixth of it: averages of four would all be cut away."""
-    rng = generator(1, "alpha")
-    card = carded(64, 2.0, np.where(rng.random((64, 64)) < 1 / 6, 255, 0))
+@pytest.mark.parametrize(("leaf", "side"), [(1, 64), (16, 16)])
+def test_as_much_of_a_smaller_texture_is_cut_out(leaf: int, side: int) -> None:
+    """Squares of some texels on a chequerboard: of those of one texel, averages would show nothing
+    or all; squares of many texels stay what they are."""
+    at = np.arange(64) // leaf
+    alpha = np.where((at[:, None] + at) % 2 == 0, 255, 0)
+    card = carded(64, 2.0, alpha)
     small = seen_textures(card, limits(120.0)).materials[0].color_texture
-    assert small is not None and len(small.pixels) == 16
-    assert 0.1 < (small.pixels[..., 3] >= 128).mean() < 0.3, "of plain averages, 0.003"
+    assert small is not None and len(small.pixels) == side

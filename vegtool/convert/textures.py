@@ -3,8 +3,9 @@
 A client shows a texture's mip in which a texel is about as large as a pixel, along the side of the
 pixel's footprint that is shorter: with anisotropy, and without it a coarser one. So texels that are
 smaller than a pixel in every direction on the surface, from as near as any eye is, are never shown,
-and the mip without them may stand for the texture. Its alpha is scaled so that as much passes the
-test as before (Castano 2010, Computing alpha mipmaps): plain averages lose leaves.
+and the mip without them may stand for the texture: the client's own, plain averages, so that it
+shows the same. Of what is cut out, averages lose some in each mip. Viewers that make up for that do
+so by what the file has, so such a texture is halved only as long as about as much of it is shown.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from vegtool.arrays import FloatArray
-from vegtool.gl.mipmaps import mip_levels
+from vegtool.gl.mipmaps import mip_levels, passing
 from vegtool.limits import Limits
 from vegtool.plant import Material, Plant, Texture
 
@@ -24,6 +25,8 @@ COARSE = 0.01
 some faces of every model are."""
 LEAST = 4
 """Texels of a side."""
+SHOWN = 0.02
+"""Of what passes the alpha test, by how much a halved texture may differ."""
 
 
 def seen_textures(plant: Plant, limits: Limits) -> Plant:
@@ -108,11 +111,15 @@ def _reduced(material: Material, times: dict[int, int], made: dict[int, Texture]
 
 
 def _halved(texture: Texture, times: int, srgb: bool, cutoff: float | None) -> Texture:
-    """As often as both sides are even and not too small: then texels meet as they did."""
+    """As often as both sides are even and not too small, so that texels meet as they did, and as
+    much is cut out."""
     found = texture.pixels
-    levels = pairwise([found, *mip_levels(found, srgb, cutoff)])
+    shown = 0.0 if cutoff is None else passing(found, cutoff)
+    levels = pairwise([found, *mip_levels(found, srgb)])
     for (before, after), _ in zip(levels, range(times), strict=False):
         if any(side % 2 or side < 2 * LEAST for side in before.shape[:2]):
+            break
+        if cutoff is not None and abs(passing(after, cutoff) - shown) > SHOWN * shown:
             break
         found = after
     return texture if found is texture.pixels else Texture(texture.name, found)

@@ -30,7 +30,7 @@ def mip_levels(pixels: ByteArray, srgb: bool, cutoff: float | None = None) -> It
     mipmaps); plain averages lose leaves. No client is told to do so: of what is measured as theirs,
     leave it out.
     """
-    shown = None if cutoff is None else float((_between(pixels[..., 3]) >= 255 * cutoff).mean())
+    shown = None if cutoff is None else passing(pixels, cutoff)
     for level in _averages(pixels, srgb):
         if shown is None or cutoff is None:
             yield level
@@ -38,6 +38,11 @@ def mip_levels(pixels: ByteArray, srgb: bool, cutoff: float | None = None) -> It
             kept = level.copy()
             kept[..., 3] = _as_shown(level[..., 3], cutoff, shown)
             yield kept
+
+
+def passing(pixels: ByteArray, cutoff: float) -> float:
+    """Share of an image (h, w, 4) uint8 that passes an alpha test, interpolated as a GPU does."""
+    return float((_between(pixels[..., 3]) >= 255 * cutoff).mean())
 
 
 def _as_shown(alpha: ByteArray, cutoff: float, shown: float) -> ByteArray:

@@ -266,11 +266,12 @@ function describe() {
   byId("held").replaceChildren(...["auto", ...levels.keys()].map((value) => {
     const label = element("label", value === "auto" ? "By distance" : String(value));
     label.prepend(element("input", "", {type: "radio", name: "level", value}));
-    if (value === 0) label.title = "The original";
+    if (value === 0 && plant.original) label.title = "The original";
     return label;
   }));
   byId("levels").replaceChildren(...levels.map((level, index) => {
-    const row = element("tr", ""), head = element("th", index ? `LOD${index}` : "Original");
+    const name = index || !plant.original ? `LOD${index}` : "Original";
+    const row = element("tr", ""), head = element("th", name);
     head.scope = "row";
     head.prepend(keyed(index));
     const flip = level.measured?.flip.mean, live = level.measured?.live.flip.mean;
@@ -312,7 +313,7 @@ function measure() {
 // What changes with every picture.
 function tell() {
   const plant = plants[view.plant], level = plant.levels[used], held = view.level !== "auto";
-  const shown = `${used ? `LOD${used}` : "Original"}${held ? ", held" : ""}`;
+  const shown = `${used || !plants[view.plant].original ? `LOD${used}` : "Original"}${held ? ", held" : ""}`;
   const pixels = plant.extent_m * pixelsPerRadian(canvas.height, camera.fov) / view.distance;
   if (byId("shown").textContent !== shown) byId("shown").textContent = shown; // read out once
   byId("size").textContent = `, ${level.triangles.toLocaleString("en")} triangles; ` +

@@ -154,7 +154,9 @@ def _plant(path: Path, models: dict[Path, bytes]) -> dict[str, Any]:
         if file not in models:
             models[file] = _glb(file, path)
         levels.append({**level, "model": list(models).index(file)})
-    told = {**{key: values[key] for key in kept if key in values}, "levels": levels}
+    whole = values.get("scene", {}).get("original", True)
+    told = {key: values[key] for key in kept if key in values}
+    told = {**told, "original": whole, "levels": levels}
     try:
         _json(told)
     except ValueError as error:
