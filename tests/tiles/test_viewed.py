@@ -262,9 +262,12 @@ def test_what_is_hidden_is_left_out(full: Full, tmp_path: Path) -> None:
         for node in made.tree.nodes(level)
     )
     assert sum(row["hidden"] for row in run.left_out()) == len(gone)
+    assert run.told()["plants"] == 304
     eyes = inside(seen.viewers, 60, 7)
     clients = Client(out), Client(tmp_path / "out")
     names = {Path(name).name for name in gone}
+    assert run.skipped and not run.skipped & run.passed
+    assert not [name for name in run.found if name in set(map(str, run.skipped))]
     missed = 0
     for place, yaw in zip(eyes.position, eyes.yaw_deg, strict=True):
         wanted, got = (client.draws(Eye(place, float(yaw)), (1440, 1080)) for client in clients)
