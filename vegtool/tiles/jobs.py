@@ -298,11 +298,12 @@ def _block(world: World, job: BlockJob) -> Iterator[Outcome]:
     with timed(seconds, "placement"):
         stand = world.pyramid.stand(job.node)
     squares = nodes_of(tree, job.node) if job.made is None else job.made
+    surveyed = set(job.surveyed)
     for node in (*squares, *job.surveyed):
         check_stop()
         try:
             own = stand if node == job.node else stand.on(tree.tiles_of(node))
-            if node in job.surveyed:
+            if node in surveyed:
                 yield _surveyed(world, node, own)
                 continue
             made = _placed(world, job, node, own)

@@ -25,6 +25,7 @@ from vegtool.progress import Progress, silent
 from vegtool.tiles.estimate import FAR_BYTES, SURFEL_BYTES
 from vegtool.tiles.jobs import (
     BlockJob,
+    Failed,
     Job,
     Lacking,
     Made,
@@ -32,6 +33,7 @@ from vegtool.tiles.jobs import (
     Outcome,
     Surveyed,
     World,
+    called,
     file_of,
     name_of,
 )
@@ -47,6 +49,8 @@ STEPS = 4
 leaves models as they are."""
 INSTANCE_BYTES = 52.0
 """Of a plant in a square of instances: its place, its turn, its scale and its tint."""
+
+GONE = "files of its quarters went while it was made; leave the folder alone, and run it again"
 
 Write = Callable[[Entry], None]
 
@@ -96,6 +100,9 @@ class ViewedRun(Run):
             far = [node for node in shown if str(node) not in self.surveyed]
             for _, same in groupby(far, lambda node: node.level):  # the lowest first
                 yield from self._again(list(same), write)
+            for lost in self._lacking:
+                name = str(lost.node)
+                self.failed[name] = Failed(name, f"{called(name)}: {GONE}")
             self._shared = {name_of(job) for job in self._sheets(far)}
             self._shared |= {name_of(job) for job in self._models(near)}
         self.progress("tiles", 1.0)
@@ -211,6 +218,8 @@ class ViewedRun(Run):
             elif isinstance(outcome, Lacking):
                 self._lacking.append(outcome)
             else:
+                if isinstance(outcome, Failed):
+                    self.found.pop(outcome.name, None)  # as it was known before
                 yield outcome
 
     def _all_nodes(self) -> list[Node]:
@@ -232,10 +241,14 @@ class ViewedRun(Run):
         for job in blocks(pyramid):
             on_it = nodes_of(pyramid.tree, job.node)
             wanted = [node for node in on_it if node not in self._unmade]
-            near = [n for n in wanted if pyramid.instanced(pyramid.tree.height(n.level))]
-            made = tuple(node for node in wanted if node not in near)
+            near, made = (
+                tuple(
+                    n for n in wanted if pyramid.instanced(pyramid.tree.height(n.level)) == is_near
+                )
+                for is_near in (True, False)
+            )
             if wanted:
-                found.append(replace(job, made=made, surveyed=tuple(near), facts=True))
+                found.append(replace(job, made=made, surveyed=near, facts=True))
         return found
 
     def _instances(self, nodes: Sequence[Node]) -> list[Job]:
