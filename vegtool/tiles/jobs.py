@@ -392,7 +392,7 @@ def _of_quarters(
     there = job.entry(str(node), key, world.out)
     if there is not None:
         return Made(there, again=False)
-    gone = _gone(world, quarters)
+    gone = _gone(world, quarters) if job.facts else ()
     if gone:
         return Lacking(node, gone)
     seconds: dict[str, float] = {}
@@ -442,7 +442,7 @@ def _far(world: World, job: FarJob) -> Iterator[Outcome]:
     if there is not None:
         yield Made(there, again=False)
         return
-    gone = _gone(world, quarters)
+    gone = _gone(world, quarters) if job.facts else ()
     if gone:
         yield Lacking(node, gone)
         return

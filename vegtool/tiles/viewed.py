@@ -33,7 +33,6 @@ from vegtool.tiles.jobs import (
     Outcome,
     Surveyed,
     World,
-    called,
     file_of,
     name_of,
 )
@@ -49,8 +48,6 @@ STEPS = 4
 leaves models as they are."""
 INSTANCE_BYTES = 52.0
 """Of a plant in a square of instances: its place, its turn, its scale and its tint."""
-
-GONE = "files of its quarters went while it was made; leave the folder alone, and run it again"
 
 Write = Callable[[Entry], None]
 
@@ -100,9 +97,6 @@ class ViewedRun(Run):
             far = [node for node in shown if str(node) not in self.surveyed]
             for _, same in groupby(far, lambda node: node.level):  # the lowest first
                 yield from self._again(list(same), write)
-            for lost in self._lacking:
-                name = str(lost.node)
-                self.failed[name] = Failed(name, f"{called(name)}: {GONE}")
             self._shared = {name_of(job) for job in self._sheets(far)}
             self._shared |= {name_of(job) for job in self._models(near)}
         self.progress("tiles", 1.0)
