@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from cards import cards
-from test_tiles_run import LEVELS, PLACED, files, library, write_tiles
+from test_tiles_run import LEVELS, PLACED, files, library, world, write_tiles
 from tile_cases import TWO_SPECIES, scene_of
 
 from vegtool.cli import run as main
@@ -29,12 +29,11 @@ from vegtool.preview.tile_forest import TileForest
 from vegtool.preview.tile_world import read_tile_world
 from vegtool.preview.tileset import read_tileset
 from vegtool.seeding import generator
-from vegtool.tiles.jobs import Made, World, file_of
+from vegtool.tiles.jobs import Made, file_of
 from vegtool.tiles.needed import contents_of, hidden_by_ground, passed_over, pruned, reached_by
 from vegtool.tiles.options import TileOptions
 from vegtool.tiles.pyramid import Pyramid, pyramid_of
 from vegtool.tiles.quadtree import quadtree_of
-from vegtool.tiles.shared import Shared
 from vegtool.tiles.textures import resolved, texels_per_metre
 from vegtool.tiles.viewed import ViewedRun
 
@@ -86,7 +85,7 @@ def view(folder: Path, made: Pyramid, camera: str, path: str | None = None) -> S
 
 def viewed(made: Pyramid, seen: SceneView, out: Path) -> tuple[ViewedRun, list[Made]]:
     """A tileset for some viewers, and what was made for it."""
-    run = ViewedRun(World(made, Shared(made, out / "tiles"), out), seen)
+    run = ViewedRun(world(made, out), seen)
     outcomes = list(run.tiles())
     assert not run.failed
     run.finish()
@@ -262,9 +261,12 @@ def test_what_is_hidden_is_left_out(full: Full, tmp_path: Path) -> None:
         for node in made.tree.nodes(level)
     )
     assert sum(row["hidden"] for row in run.left_out()) == len(gone)
+    assert run.told()["plants"] == 304
     eyes = inside(seen.viewers, 60, 7)
     clients = Client(out), Client(tmp_path / "out")
     names = {Path(name).name for name in gone}
+    assert run.skipped and not run.skipped & run.passed
+    assert not [name for name in run.found if name in set(map(str, run.skipped))]
     missed = 0
     for place, yaw in zip(eyes.position, eyes.yaw_deg, strict=True):
         wanted, got = (client.draws(Eye(place, float(yaw)), (1440, 1080)) for client in clients)
@@ -325,7 +327,9 @@ def test_a_file_that_is_gone_is_made_again(full: Full, tmp_path: Path) -> None:
 
 
 @pytest.mark.gl
-def test_squares_that_others_are_made_of_are_not_kept(tmp_path: Path) -> None:
+def test_squares_that_others_are_made_of_are_not_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A square that is clustered anew is as it would be of all; its quarters are made for it, and
     gone. When they are asked for later, or it is to be made anew, so are they."""
     made = grown(tmp_path, tile=32.0, near=1, triangles=200)
@@ -351,6 +355,12 @@ def test_squares_that_others_are_made_of_are_not_kept(tmp_path: Path) -> None:
     found = tiles(tmp_path / "out")
     assert found.items() < every.items() and len(found) > 4
     same_everywhere(near, tmp_path / "full", tmp_path / "out", 100)
+    viewed(made, seen, tmp_path / "out")
+    (tmp_path / "out" / file_of(root)).unlink()
+    monkeypatch.setattr("vegtool.tiles.jobs.merged_tile", lambda *given: 1 / 0)
+    run = ViewedRun(world(made, tmp_path / "out"), seen)
+    list(run.tiles())
+    assert {str(root), "3/0/0"} <= run.failed.keys(), "it, and what it is to be made of"
 
 
 def landscape_of(folder: Path, rng: np.random.Generator, surfels: bool, error: float) -> TileEntry:

@@ -7,6 +7,7 @@ tile's error, seen from the point of its box that is nearest, is more than some 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import radians, tan
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,8 @@ from vegtool.tiles.journal import key_of
 from vegtool.tiles.placement import Placement
 from vegtool.tiles.terrain import terrain_of
 
+WIDE = 16 / 9
+"""Times their height, how wide pictures are taken to be."""
 SLACK = 1e-6
 """Of errors: clients' numbers are rounded otherwise than ours."""
 
@@ -98,10 +101,14 @@ class SceneView:
         return hidden(boxes, self.viewers)
 
     def pixels_per_metre(self, boxes: FloatArray) -> FloatArray:
-        """(n,) pixels that no metre in a box is more than; infinite where an eye may be in it."""
+        """(n,) pixels that no metre in a box is more than, in the corners of pictures that are
+        WIDE; infinite where an eye may be in it."""
         near = self.viewers.nearest_to_boxes(boxes)
         found = np.full(len(near), np.inf)
-        np.divide(self.display.pixels_per_metre(1.0), near, out=found, where=near > 0)
+        # off the axis by an angle, a metre across the line of sight is 1 / cos^2 times as large
+        corner = tan(radians(self.display.fov_y_deg) / 2) ** 2 * (1 + WIDE**2)
+        largest = (1 + corner) * self.display.pixels_per_metre(1.0)
+        np.divide(largest, near, out=found, where=near > 0)
         return found
 
 

@@ -17,7 +17,7 @@ from vegtool.console import human_bytes, table
 from vegtool.errors import VegtoolError
 from vegtool.progress import Progress
 from vegtool.tiles.jobs import TILES, Failed, Made, SheetJob, World, do
-from vegtool.tiles.needed import hidden_by_ground, passed_over, reached_by
+from vegtool.tiles.needed import hidden_by_ground, passed_over, reached_by, skipped_over
 from vegtool.tiles.pyramid import MOST, Pyramid
 from vegtool.tiles.quadtree import Node
 from vegtool.tiles.run import blocks, models
@@ -63,11 +63,12 @@ def _squares(pyramid: Pyramid, view: View | None) -> list[_Squares]:
         return [_Squares(nodes, nodes) for nodes in every]
     found, passed = [], passed_over(pyramid, view)
     behind = hidden_by_ground(pyramid, view)
+    skipped = skipped_over(pyramid, passed, behind - passed)
     for height, (nodes, reached) in enumerate(zip(every, reached_by(pyramid, view), strict=True)):
         kept = [node for node in reached if node not in passed and node not in behind]
         made = kept
         if not pyramid.instanced(height):  # others may be made of them
-            made = [node for node in nodes if node not in passed]
+            made = [node for node in nodes if node not in passed and node not in skipped]
         near, hidden = (sum(node in part for node in nodes) for part in (passed, behind - passed))
         found.append(_Squares(kept, made, near, hidden))
     return found

@@ -298,11 +298,12 @@ def _block(world: World, job: BlockJob) -> Iterator[Outcome]:
     with timed(seconds, "placement"):
         stand = world.pyramid.stand(job.node)
     squares = nodes_of(tree, job.node) if job.made is None else job.made
+    surveyed = set(job.surveyed)
     for node in (*squares, *job.surveyed):
         check_stop()
         try:
             own = stand if node == job.node else stand.on(tree.tiles_of(node))
-            if node in job.surveyed:
+            if node in surveyed:
                 yield _surveyed(world, node, own)
                 continue
             made = _placed(world, job, node, own)
@@ -391,7 +392,7 @@ def _of_quarters(
     there = job.entry(str(node), key, world.out)
     if there is not None:
         return Made(there, again=False)
-    gone = _gone(world, quarters)
+    gone = _gone(world, quarters) if job.facts else ()
     if gone:
         return Lacking(node, gone)
     seconds: dict[str, float] = {}
@@ -441,7 +442,7 @@ def _far(world: World, job: FarJob) -> Iterator[Outcome]:
     if there is not None:
         yield Made(there, again=False)
         return
-    gone = _gone(world, quarters)
+    gone = _gone(world, quarters) if job.facts else ()
     if gone:
         yield Lacking(node, gone)
         return

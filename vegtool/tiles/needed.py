@@ -54,7 +54,8 @@ def reached_by(pyramid: Pyramid, view: View) -> list[list[Node]]:
 
 
 def hidden_by_ground(pyramid: Pyramid, view: View) -> frozenset[Node]:
-    """The squares, with those on them, before all of which the ground is for every eye."""
+    """The squares, with those on them, before all of which the ground is for every eye; none where
+    that is before the whole landscape, as something is to be shown."""
     found: set[Node] = set()
     if not view.hills:
         return frozenset()
@@ -68,6 +69,18 @@ def hidden_by_ground(pyramid: Pyramid, view: View) -> frozenset[Node]:
     for level in range(pyramid.tree.depth - 1, -1, -1):
         for node in pyramid.tree.nodes(level):
             if all(quarter in found for quarter in pyramid.tree.quarters(node)):
+                found.add(node)
+    return frozenset() if pyramid.tree.nodes(0)[0] in found else frozenset(found)
+
+
+def skipped_over(pyramid: Pyramid, passed: Set[Node], hidden: Set[Node]) -> frozenset[Node]:
+    """The hidden squares that nothing is made of: those that they lie on are hidden or passed over
+    as well."""
+    found: set[Node] = set()
+    for level in range(pyramid.tree.depth + 1):
+        for node in pyramid.tree.nodes(level):
+            above = level == 0 or node.parent in passed or node.parent in found
+            if above and node in hidden:
                 found.add(node)
     return frozenset(found)
 

@@ -20,7 +20,7 @@ from vegtool.arrays import FloatArray
 from vegtool.gl.mipmaps import mip_levels
 from vegtool.plant import Plant, Texture
 
-WIDELY_SPREAD = 0.01
+WIDELY_SPREAD = 0.001
 """Of the area that shows a texture, the part on which texels may be larger than they are taken to
 be: slivers, whose texels are as large as one likes."""
 LEAST_PIXELS = 1e-6

@@ -25,6 +25,7 @@ from vegtool.progress import Progress, silent
 from vegtool.tiles.estimate import FAR_BYTES, SURFEL_BYTES
 from vegtool.tiles.jobs import (
     BlockJob,
+    Failed,
     Job,
     Lacking,
     Made,
@@ -36,7 +37,7 @@ from vegtool.tiles.jobs import (
     name_of,
 )
 from vegtool.tiles.journal import Entry, appended
-from vegtool.tiles.needed import contents_of, hidden_by_ground, passed_over, pruned
+from vegtool.tiles.needed import contents_of, hidden_by_ground, passed_over, pruned, skipped_over
 from vegtool.tiles.quadtree import Node, nodes_of
 from vegtool.tiles.run import COST, TREE, Each, Run, blocks, clean, models
 from vegtool.tiles.tree import tree_of
@@ -53,8 +54,8 @@ Write = Callable[[Entry], None]
 
 class ViewedRun(Run):
     """A tileset that is being made for some viewers. passed: squares that none is far enough from.
-    hidden: squares that none sees for the ground. surveyed: squares of instances, by name. kept:
-    files of the tiles that are shown."""
+    hidden: squares that none sees for the ground; skipped: those of them that nothing is made of.
+    surveyed: squares of instances, by name. kept: files of the tiles that are shown."""
 
     def __init__(
         self, world: World, view: View, each: Each | None = None, progress: Progress = silent
@@ -63,6 +64,8 @@ class ViewedRun(Run):
         self.view = view
         self.passed = passed_over(world.pyramid, view)
         self.hidden = hidden_by_ground(world.pyramid, view) - self.passed
+        self.skipped = skipped_over(world.pyramid, self.passed, self.hidden)
+        self._unmade = self.passed | self.skipped
         self.surveyed: dict[str, Surveyed] = {}
         self.kept: set[str] = set()
         self._plants = 0
@@ -86,8 +89,7 @@ class ViewedRun(Run):
                     yield from self._far_squares(nodes, write)
                 yield from self._do(self._sheets(nodes), write)
             root = self._root()
-            if root is not None:
-                self.kept, self._plants = contents_of(root), root.plants
+            self.kept = contents_of(root)
             shown = [node for node in self._all_nodes() if file_of(node) in self.kept]
             near = [node for node in shown if str(node) in self.surveyed]
             yield from self._do(self._models(near), write)
@@ -135,6 +137,7 @@ class ViewedRun(Run):
             near = [node for node in nodes if node in self.passed]
             kept = sum(file_of(node) in self.kept for node in nodes)
             rest = [node for node in nodes if file_of(node) not in self.kept]
+            skipped = [node for node in nodes if node in self.skipped]
             hidden, far = (
                 [one for one in map(self._told_of, part) if one is not None]
                 for part in (
@@ -142,21 +145,22 @@ class ViewedRun(Run):
                     [node for node in rest if node not in self.hidden],
                 )
             )
-            others = [*hidden, *far]
-            if not others and not near:
+            others, unmade = [*hidden, *far], [*near, *skipped]
+            if not others and not unmade:
                 continue
             rows.append(
                 {
                     "height": height,
                     "side_m": tree.side_m * 2.0**height,
-                    "squares": kept + len(near) + len(others),
+                    "squares": kept + len(unmade) + len(others),
                     "kept": kept,
                     "too_near": len(near),
                     "too_far": len(far),
-                    "hidden": len(hidden),
-                    "plants": sum(one.facts["plants"] for one in others),
+                    "hidden": len(hidden) + len(skipped),
+                    "plants": sum(one.facts["plants"] for one in others)
+                    + sum(map(self._count, skipped)),
                     "bytes": round(
-                        sum(map(self._bytes_of, others)) + sum(map(self._near_bytes, near))
+                        sum(map(self._bytes_of, others)) + sum(map(self._unmade_bytes, unmade))
                     ),
                 }
             )
@@ -176,9 +180,14 @@ class ViewedRun(Run):
         """About how many a square would be: as it was made, or as instances are."""
         return sum(entry.files.values()) or INSTANCE_BYTES * float(entry.facts["plants"])
 
-    def _near_bytes(self, node: Node) -> float:
+    def _count(self, node: Node) -> int:
+        """Of plants on a square, at most."""
         pyramid = self.world.pyramid
-        count = float(pyramid.placement.tiles.count[pyramid.tree.tiles_of(node)].sum())
+        return int(pyramid.placement.tiles.count[pyramid.tree.tiles_of(node)].sum())
+
+    def _unmade_bytes(self, node: Node) -> float:
+        """About how many a square would be that nobody looked at."""
+        pyramid, count = self.world.pyramid, float(self._count(node))
         if pyramid.instanced(pyramid.tree.height(node.level)):
             return INSTANCE_BYTES * count
         if pyramid.options.surfels:
@@ -192,8 +201,9 @@ class ViewedRun(Run):
         root = tree_of(self.world.pyramid, {**looked_at, **self.found})
         if root is None:
             return None
-        left = pruned(root, self.view, {file_of(node) for node in self.hidden})
-        return pruned(root, self.view) if left is None else left  # rather than nothing
+        alone = (node for node in self.skipped if node.parent not in self.skipped)
+        self._plants = root.plants + sum(map(self._count, alone))
+        return pruned(root, self.view, {file_of(node) for node in self.hidden})
 
     def _do(self, jobs: Sequence[Job], write: Write) -> Iterator[Outcome]:
         for outcome in super()._do(jobs, write):
@@ -202,6 +212,8 @@ class ViewedRun(Run):
             elif isinstance(outcome, Lacking):
                 self._lacking.append(outcome)
             else:
+                if isinstance(outcome, Failed):
+                    self.found.pop(outcome.name, None)  # as it was known before
                 yield outcome
 
     def _all_nodes(self) -> list[Node]:
@@ -215,17 +227,22 @@ class ViewedRun(Run):
         if pyramid.instanced(height):
             return []
         nodes = pyramid.tree.nodes(pyramid.tree.depth - height)
-        return [node for node in nodes if node not in self.passed]
+        return [node for node in nodes if node not in self._unmade]
 
     def _blocks(self) -> list[Job]:
         """What of each is merged, and what of it is looked at."""
         pyramid, found = self.world.pyramid, list[Job]()
         for job in blocks(pyramid):
             on_it = nodes_of(pyramid.tree, job.node)
-            wanted = [node for node in on_it if node not in self.passed]
-            near = [n for n in wanted if pyramid.instanced(pyramid.tree.height(n.level))]
-            made = tuple(node for node in wanted if node not in near)
-            found.append(replace(job, made=made, surveyed=tuple(near), facts=True))
+            wanted = [node for node in on_it if node not in self._unmade]
+            near, made = (
+                tuple(
+                    n for n in wanted if pyramid.instanced(pyramid.tree.height(n.level)) == is_near
+                )
+                for is_near in (True, False)
+            )
+            if wanted:
+                found.append(replace(job, made=made, surveyed=near, facts=True))
         return found
 
     def _instances(self, nodes: Sequence[Node]) -> list[Job]:
