@@ -108,6 +108,23 @@ def test_tiles_that_add_nothing_are_as_if_looked_at(tmp_path: Path) -> None:
         assert found.elevation == pytest.approx(whole.elevation)
 
 
+@pytest.mark.parametrize("case", CASES)
+def test_groups_that_add_nothing_are_as_if_looked_at(
+    tmp_path: Path, case: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whether plants are asked one by one, or in groups down to single ones."""
+    ground = hills()
+    plants, scene = wood(ground, 0.0, 60), scene_with(tmp_path, *CASES[case])
+    found = []
+    for few in (1, 60):
+        monkeypatch.setattr("vegtool.needs.need.FEW", few)
+        found.append(need_of(scene, replace(plants, of_tile=60), ground))
+    grouped, single = found
+    assert (grouped.nearest, grouped.farthest) == pytest.approx((single.nearest, single.farthest))
+    assert grouped.elevation == pytest.approx(single.elevation)
+    assert grouped.azimuth == single.azimuth
+
+
 def test_a_road_and_a_tree_beside_it(tmp_path: Path) -> None:
     """100 m of it along x, at 1.7 m; the tree stands 8 m to the south, and its middle is 3.3 m
     above the eyes."""
