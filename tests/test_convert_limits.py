@@ -219,6 +219,17 @@ def test_what_errs_too_much_has_a_finer_one_before_it(
 
 
 @pytest.mark.gl
+def test_surfels_stand_beside_triangles(bush: Plant, tmp_path: Path) -> None:
+    """Of them alone, no viewer makes a picture that is right from near: the original is kept."""
+    how = ConvertOptions(method="surfels", points=500, levels=2)
+    chain = convert(bush, how, BY_RULE, limits=limits(1e4))
+    assert chain.plant is None and [level.kind for level in chain.levels] == ["mesh", "surfels"]
+    write_chain(chain, tmp_path)
+    one = read_species(tmp_path / f"{chain.name}.lod.json")
+    assert one.whole and one.surfels is not None and len(one.levels) == 1
+
+
+@pytest.mark.gl
 def test_the_manifest_says_so(bush: Plant, tmp_path: Path) -> None:
     chain = convert(bush, OPTIONS, BY_RULE, limits=limits(1000.0, 3000.0))
     write_chain(chain, tmp_path / "a")

@@ -128,5 +128,5 @@ def _said(needs: Sequence[Need], limits: Limits) -> str:
     size = "" if np.isinf(largest) else f", at most {largest:,.0f} pixels large"
     return (
         f"the eyes that see its {count:,} plants {between(limits.nearest_m, limits.farthest_m)} "
-        f"away (at its own size), from {low:.0f} to {high:.0f} degrees above the horizon{size}"
+        f"away (at its own size), from {round(low)} to {round(high)} degrees above the horizon{size}"
     )
