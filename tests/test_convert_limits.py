@@ -17,7 +17,7 @@ from vegtool.formats.gltf import level_glb, write_chain
 from vegtool.formats.manifest import read_manifest
 from vegtool.growth import sample
 from vegtool.limits import Limits, Span
-from vegtool.lod import Display, Level, LodChain
+from vegtool.lod import FADE_FRACTION, Display, Level, LodChain
 from vegtool.measure.contact_sheet import contact_sheet
 from vegtool.measure.distances import rounded_down, switch_distances
 from vegtool.measure.options import MeasureOptions
@@ -216,6 +216,34 @@ def test_what_errs_too_much_has_a_finer_one_before_it(
     with pytest.raises(QualityError, match="none"):
         convert(bush, OPTIONS, BY_RULE, limits=limits(1e4))
     assert asked[-1] == 3 and set(asked[:-1]) == {1}, "and one alone before"
+
+
+@pytest.mark.gl
+def test_measured_levels_are_enough_and_begin_where_they_did(bush: Plant) -> None:
+    """The first has faded in before the nearest eye comes, and errs no more than the limit there;
+    coarser ones are used from where they are without a scene."""
+    measure = MeasureOptions(max_error=0.3)
+    whole = convert(bush, OPTIONS, measure)
+    near = [level.near_distance_m for level in whole.levels]
+    nearest = 1.4 * near[1]
+    chain = convert(bush, OPTIONS, measure, limits=limits(nearest))
+    assert chain.plant is bush
+    first, *others = chain.levels
+    assert first.measured is not None and first.measured.errors["flip"].mean <= 0.3
+    from_m = bush.extent * Display().pixels_per_metre(1.0) / first.measured.pixels
+    assert from_m * (1 + FADE_FRACTION) < nearest
+    assert {level.near_distance_m for level in others} <= set(near)
+
+
+@pytest.mark.gl
+def test_surfels_stand_beside_triangles(bush: Plant, tmp_path: Path) -> None:
+    """Of them alone, no viewer makes a picture that is right from near: the original is kept."""
+    how = ConvertOptions(method="surfels", points=500, levels=2)
+    chain = convert(bush, how, BY_RULE, limits=limits(1e4))
+    assert chain.plant is None and [level.kind for level in chain.levels] == ["mesh", "surfels"]
+    write_chain(chain, tmp_path)
+    one = read_species(tmp_path / f"{chain.name}.lod.json")
+    assert one.whole and one.surfels is not None and len(one.levels) == 1
 
 
 @pytest.mark.gl

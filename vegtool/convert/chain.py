@@ -136,7 +136,8 @@ def convert(
 
             notes = (*notes, *coverage_notes(kept, truth_at))
     notes = (*notes, *light_notes(plant, sun))
-    is_whole = not complete(kept, span)
+    # surfels are no triangles, which who draws them begins with
+    is_whole = options.method == SURFELS or not complete(kept, span)
     misses = (*budget_notes(kept, options, int(is_whole)), *make.misses)
     beside = make.beside()
     if SUFFIX in beside and (sun is not None or plant.exposure is not None):

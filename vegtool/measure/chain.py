@@ -220,8 +220,8 @@ def _by_error(
         return bool(error <= _limits(np.array([live]), options)[0])
 
     distance_m = bench.distances()
-    if distance_m[-1] < span.nearest_m:  # what is measured is to be seen
-        distance_m = np.array([max(float(distance_m[-1]), min(least_m))])
+    if span.nearest_m and distance_m[-1] < min(least_m):  # no eye sees plants as large as that
+        distance_m = np.array([rounded_up(min(least_m))])
     flips = bench.everything(distance_m, progress)
     while True:
         allowed, errors = _limits(flips[:, 0], options), list(flips[:, 1:].T)

@@ -126,7 +126,8 @@ def _said(needs: Sequence[Need], limits: Limits) -> str:
     low, high = limits.elevation_deg
     largest = max(need.largest_px for need in needs)
     size = "" if np.isinf(largest) else f", at most {largest:,.0f} pixels large"
+    away = between(limits.nearest_m, limits.farthest_m)
     return (
-        f"the eyes that see its {count:,} plants {between(limits.nearest_m, limits.farthest_m)} "
-        f"away (at its own size), from {low:.0f} to {high:.0f} degrees above the horizon{size}"
+        f"the eyes that see its {count:,} plants {away} away (at its own size), from {round(low)} "
+        f"to {round(high)} degrees above the horizon{size}"
     )

@@ -313,7 +313,8 @@ function measure() {
 // What changes with every picture.
 function tell() {
   const plant = plants[view.plant], level = plant.levels[used], held = view.level !== "auto";
-  const shown = `${used || !plants[view.plant].original ? `LOD${used}` : "Original"}${held ? ", held" : ""}`;
+  const name = used || !plant.original ? `LOD${used}` : "Original";
+  const shown = `${name}${held ? ", held" : ""}`;
   const pixels = plant.extent_m * pixelsPerRadian(canvas.height, camera.fov) / view.distance;
   if (byId("shown").textContent !== shown) byId("shown").textContent = shown; // read out once
   byId("size").textContent = `, ${level.triangles.toLocaleString("en")} triangles; ` +
