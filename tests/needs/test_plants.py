@@ -155,7 +155,7 @@ def test_what_others_are_told(
         0, 1, 1, 2,
     ]  # fmt: skip
     (note,) = without_original(one)
-    assert "out/bush.lod.json: lacks the original" in note and "vegtool convert" in note
+    assert note.startswith("lacks the original") and "vegtool convert MODEL" in note
 
     picture = ["--screenshot", "a.png", "--size", "60x540", "-f"]
     assert run(["preview", "out", "--scene", "scene.toml", *picture]) == 0

@@ -100,10 +100,10 @@ def of_any_eye(species: Sequence[Species], focal_px: float, scene: Scene) -> lis
 
 
 def without_original(one: Species) -> list[str]:
-    """The sentence on a species of which something is made that is made of originals."""
+    """What is said of a species of which something is made that is made of originals."""
     if one.whole or one.made_for is None:
         return []
     return [
-        f"{one.made_for.manifest}: lacks the original, which coarser levels and surfels are made "
-        f"of; they are made of its finest level; {again_of(one.made_for)}"
+        "lacks the original, which coarser levels and surfels are made of; they are made of its "
+        f"finest level; {again_of(one.made_for)}"
     ]

@@ -214,7 +214,7 @@ def pyramid_of(
     display = Display()
     lacks = of_any_eye(found.species, display.pixels_per_metre(1.0), scene)
     if options.surfels:
-        lacks += [note for one in found.species for note in without_original(one)]
+        lacks += [f"{one.name}: {note}" for one in found.species for note in without_original(one)]
     notes = (*terrain.notes, *placement.notes, *notes_on(terrain, placement), *found.notes, *lacks)
     return Pyramid(placement, found.species, tree, options, display, notes, samples)
 
