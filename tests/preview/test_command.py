@@ -357,6 +357,8 @@ def test_a_picture_too_large_for_the_gpu_is_a_sentence(
     def refuse(*_: object) -> None:
         raise moderngl.Error("the framebuffer is not complete")
 
+    # what plants are measured with is there before
+    assert run(["preview", "bush.glb", "--screenshot", "small.png", "--size", "64x64"]) == 0
     monkeypatch.setattr("moderngl.Context.framebuffer", refuse)
     assert run(["preview", "bush.glb", "--screenshot", "a.png", "--size", "9000x9000"]) == 5
     said = capsys.readouterr().err
