@@ -320,7 +320,8 @@ def crops_of(forest: Forest, eye: Eye, size: tuple[int, int]) -> list[Part]:
         if inside[row] and hidden[part].mean() <= HIDDEN:
             parts.append(part)
         hidden[part] = True
-    return [parts[i] for i in np.unique(np.linspace(0, len(parts) - 1, CROPS).astype(int))]
+    spread = np.linspace(0, len(parts) - 1, CROPS if parts else 0)
+    return [parts[i] for i in np.unique(spread.astype(int))]
 
 
 def _around(middle: float, half: float) -> slice:
